@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop.identification.remarks import identities
+from twinloop.identification.records import Run
+from twinloop.identification.remarks import identities, remarks
 from twinloop.identification.search.structure import Other, Sum
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.terms.libraries import LIBRARIES, rungs
@@ -42,3 +43,17 @@ def test_a_worse_law_is_not_named_nor_one_that_evolved(others):
 
 def test_behind_an_evolved_law_the_next_one_is_named():
     assert "level**2" in said(("evolved", 0.5), ("square", 1.0))[0]
+
+
+def of_still(level, pump):
+    """What is said of whether the level moved, of a run of 30 periods."""
+    run = Run.of(np.full((31, 1), 0.3) + level, pump)
+    said = remarks([run], Pool(2, 10), SIGNALS, [], 30.0, 30)
+    return [(remark.code, remark.severity) for remark in said]
+
+
+def test_commands_that_nothing_answers_are_a_serious_remark_and_a_system_at_rest_is_a_note():
+    rest, moves = np.zeros((30, 1)), np.linspace(0.0, 1.0, 30)[:, np.newaxis]
+    assert of_still(0.0, moves) == [("never-moved", "serious")]
+    assert of_still(0.0, rest) == [("never-moved", "note")]
+    assert of_still(np.linspace(0.0, 1.0, 31)[:, np.newaxis], moves) == []

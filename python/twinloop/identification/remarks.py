@@ -19,6 +19,8 @@ from twinloop.signals import Signals
 
 TWINS = 4.0
 """Description length within which two laws are equally good."""
+STILL = 1e-9
+"""Share of its scale by which a signal moves at most that never moved."""
 
 
 def symbols_of(signals: Signals, pool: Pool, sums: Sequence[Sum]) -> list[str]:
@@ -186,12 +188,10 @@ def remarks(
     still = [
         signals.state_names[i]
         for i in range(signals.n_x)
-        if max(float(np.ptp(run.states[:, i])) for run in runs) <= 1e-9 * signals.states[i].scale
+        if max(float(np.ptp(run.states[:, i])) for run in runs) <= STILL * signals.states[i].scale
     ]
     if still:
-        said.append(
-            note("never-moved", f"{', '.join(still)} never moved: nothing could be learnt of what drives it.")
-        )
+        said.append(_never_moved(still, runs, signals))
     said += [remark for found in sums for remark in identities(found, pool, signals)]
     if ignored:
         several = (
@@ -199,3 +199,16 @@ def remarks(
         )
         said.append(note("outliers", several))
     return said
+
+
+def _never_moved(still: Sequence[str], runs: Sequence[Run], signals: Signals) -> Remark:
+    """That some states never moved: a reason to look at the rig where commands did and nothing answered them."""
+    sizes = np.array([command.size for command in signals.commands])
+    sent = any(bool((np.ptp(run.commands, axis=0) > STILL * sizes).any()) for run in runs)
+    if sent and len(still) == signals.n_x:
+        return serious(
+            "never-moved",
+            f"Commands moved and nothing answered: {', '.join(still)} never moved. Sensors were off or are not"
+            " logged, or no command reached the system; look there before you fly another test.",
+        )
+    return note("never-moved", f"{', '.join(still)} never moved: nothing could be learnt of what drives it.")

@@ -96,6 +96,11 @@ def test_runs_that_were_all_cut_and_a_twin_that_does_not_follow_are_told():
     assert "does not follow" in said(flown(), follows=False)[0]
 
 
+def test_where_nothing_answered_the_commands_no_other_effect_is_looked_for():
+    (remark,) = diagnostics_of([flown(size=0.0)], SIGNALS, STEPS, Findings(False, unanswered=True))
+    assert remark.sentence.endswith("the remarks before this one say why.")
+
+
 def test_where_the_records_show_no_wrong_sign_none_is_looked_for():
     (sentence,) = said(flown(), flown(1), follows=False)
     assert "check the signs" not in sentence and "contact" in sentence

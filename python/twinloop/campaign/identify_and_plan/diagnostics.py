@@ -32,6 +32,7 @@ class Findings:
         misses: states that its free runs miss by more than noise and known disturbances explain.
         others: numbers of the tests whose recorded commands are none that their controllers give.
         recurring: states whose disturbance comes again in flight after flight.
+        unanswered: whether commands moved and no state did, which is said already.
         unmoved: states that move though their equations say that nothing moves them.
         without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
         pieces: steps of those in which each flight is followed; empty: all in whole.
@@ -43,6 +44,7 @@ class Findings:
     misses: Sequence[Miss] = ()
     others: Sequence[int] = ()
     recurring: tuple[str, ...] = ()
+    unanswered: bool = False
     unmoved: Sequence[str] = ()
     without_test: bool = False
     pieces: Sequence[int] = ()
@@ -78,7 +80,7 @@ def diagnostics_of(
     ]
     said += _in_pieces(experiments, found.pieces, signals.dt)
     if not found.follows:
-        explained = any(remark.serious for remark in said)
+        explained = found.unanswered or any(remark.serious for remark in said)
         said += _does_not_follow(explained, found.without_test, found.disturbed)
     else:
         said += _free_run(found.misses, len(experiments), signals) if found.misses else ()

@@ -104,6 +104,7 @@ def findings(
         misses=answer.misses(flights, setup, workers),
         others=() if answer.follows else other_commands(book.experiments),
         recurring=tuple(names[state] for state, cause in answer.causes.items() if cause == "law"),
+        unanswered=any(each.serious and each.code == "never-moved" for each in identified.remarks),
         unmoved=[names[state] for state in answer.unmoved],
         without_test=bool(lost) and all(run.test is None for run in lost),
         pieces=pieces,
