@@ -86,3 +86,27 @@ def test_an_angle_that_wraps_is_followed_round_and_a_wrong_sign_is_seen_all_the_
     states = np.stack([np.angle(np.exp(1j * angle)), sign * rate], axis=1)
     found = said(tl.Trajectory(t, states, np.zeros((200, 1))), known)
     assert [remark.code for remark in found] == ([] if sign > 0.0 else ["derivative"])
+
+
+@pytest.mark.parametrize(("dead", "value"), [("p", 0.7), ("p", 0.0), ("roll", 0.3)])
+def test_a_sensor_that_gives_one_number_contradicts_what_moves(dead, value):
+    column = signals().state_names.index(dead)
+    recorded = [flight(0.6, False, seed=seed) for seed in range(2)]
+    for run in recorded:
+        states = run.states.copy()
+        states[:, column] = value
+        run.__dict__["states"] = states
+    assert [remark.code for remark in against_derivatives(recorded, signals())] == ["derivative"]
+
+
+def test_what_turns_evenly_or_hardly_moves_contradicts_no_constant_rate():
+    heading = tl.Signals(
+        [tl.State("a", "rad", 1.0, periodic=True), tl.State("w", "rad/s", 1.0, derivative_of="a")],
+        [tl.Command("u", "1", (-1.0, 1.0))],
+        DT,
+    )
+    t = DT * np.arange(STEPS + 1)
+    even = np.column_stack([(7.0 * t + np.pi) % (2.0 * np.pi) - np.pi, np.full(STEPS + 1, 7.0)])
+    rest = np.column_stack([1e-3 * np.sin(t), np.zeros(STEPS + 1)])
+    for states in (even, rest, np.zeros((STEPS + 1, 2))):
+        assert not said(tl.Trajectory(t, states, np.zeros((STEPS, 1))), heading)

@@ -26,6 +26,8 @@ from twinloop.remarks import Remark, serious
 from twinloop.signals import RigidBody, Signals
 from twinloop.trajectory import Trajectory
 
+SEEN = 0.02
+"""Share of its scale that a state moves at least if it contradicts a constant sensor: less may be rounded away."""
 AS_A_BODY = 0.25
 """Share of their deviation from integrated derivatives that three angles have at most if body rates turn them."""
 
@@ -47,7 +49,9 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
         if rate.derivative_of is None or (body is not None and rate.name in body.rates):
             continue
         j = signals.state_names.index(rate.derivative_of)
-        (how,) = in_spite_of_drift(partial(_of_derivative, runs, (j, i), signals.dt, noise))
+        how = _beside_a_constant(runs, (j, i), signals, noise)
+        if how is None:
+            (how,) = in_spite_of_drift(partial(_of_derivative, runs, (j, i), signals.dt, noise))
         if how:
             yield serious(
                 "derivative",
@@ -67,6 +71,28 @@ def _of_derivative(
     bent = [tuple(map(without_line, pair)) for pair in pairs]
     how = contradiction(bent, BENT * BENT * noise[j], WALKED * WALKED * walks)
     return [contradiction(pairs, MOVED * MOVED * noise[j], 0.0) if how is None else how]
+
+
+def _beside_a_constant(
+    runs: Sequence[Run], of: tuple[int, int], signals: Signals, noise: Floats
+) -> str | None:
+    """How a state contradicts its derivative where one of them is constant in all runs; None where neither is.
+
+    A constant derivative moves its state along a line: only what the state does beside one contradicts it.
+    """
+    j, i = of
+    on = [run.continued(signals).states for run in runs]
+    constant = [all(np.ptp(states[:, place]) == 0.0 for states in on) for place in of]
+    if not any(constant):
+        return None
+    pairs = [moved(states[:, j], states[:, i], signals.dt) for states in on]
+    other = 1 if constant[0] else 0
+    size = float(np.square(np.concatenate([without_line(pair[other]) for pair in pairs])).mean())
+    walks = sum(float(walk(noise[i], signals.dt, len(states) - 1)) for states in on)
+    rows = sum(len(states) for states in on)
+    scatter = WALKED * WALKED * walks / rows if constant[0] else MOVED * MOVED * float(noise[j])
+    least = SEEN * SEEN * signals.states[j].scale ** 2
+    return "does not change as" if size > max(least, scatter) else ""
 
 
 def _as_a_body(runs: Sequence[Run], signals: Signals, noise: Floats) -> RigidBody | None:
