@@ -97,6 +97,31 @@ def test_a_remark_has_a_severity_and_comes_back_from_its_record():
         Remark("copies", "seriuos", "Two records are equal.")
 
 
+def dead(run, column=slice(None), value=0.0):
+    states = run.states.copy()
+    states[:, column] = value
+    return tl.Trajectory(run.t, states, run.commands)
+
+
+@pytest.mark.parametrize("how", ["tell", "attach", "tell_failed"])
+def test_what_speaks_against_a_flight_is_a_warning_as_soon_as_it_is_told(how):
+    campaign = made()
+    first = campaign.test(GAINS)
+    run = dead(PLANT.run(first), 1)
+    tell = {
+        "tell": lambda: campaign.tell(first, run),
+        "attach": lambda: campaign.attach(run),
+        "tell_failed": lambda: campaign.tell_failed(first, "a motor cut out", run),
+    }[how]
+    with pytest.warns(RemarkWarning, match=r"rate is 0 rad/s in every row.*\(still\)") as said:
+        tell()
+    assert {each.filename for each in said} == {__file__} and len(campaign.experiments) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        other = begun()  # a flight of which nothing is to be said
+        other.tell_failed(other.test(GAINS), "there is no log")
+
+
 # Advice, report, picture
 
 

@@ -23,6 +23,7 @@ from twinloop.campaign.entering import attached_run, flown_test
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
+from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.examination.loops import loops_around
 from twinloop.campaign.flying import checked_budget, checked_risk, fly
 from twinloop.campaign.guarding import guard_of
@@ -220,6 +221,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def tell(self, test: Test, trajectory: Trajectory) -> None:
         """Adds the run of a test, in any order; a second run of a test is a replicate.
 
+        What speaks against the flight by itself, such as a sensor that was off, is said as a `RemarkWarning`.
+
         Args:
             test: from this campaign.
             trajectory: the measured run; shorter than the test if the run was cut.
@@ -231,6 +234,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             own = self._book.own(test)
             self._book.enter(flown_test(self.setup, own, trajectory, self._error_so_far))
         self.interrupted = False
+        self._warn_of_last(own)
 
     def tell_failed(self, test: Test, reason: str, partial: Trajectory | None = None) -> None:
         """Adds the failure of a test on the system.
@@ -249,12 +253,14 @@ class Campaign(Shown, Persistent, kind="campaign"):
         with self._entering():
             self._book.fail(test, reason, partial, self._error_so_far)
         self.interrupted = False
+        if partial is not None:
+            self._warn_of_last(test)
 
     def attach(self, trajectory: Trajectory) -> None:
         """Adds a run without a test, of any length and under any commands.
 
         The twin is judged on it by its free run under the recorded commands. It has no quality, and `run` does not
-        count it.
+        count it. What speaks against the log by itself is said as a `RemarkWarning`.
 
         Args:
             trajectory: of the same signals.
@@ -271,6 +277,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         with self._entering():
             self._book.enter(attached_run(self.setup, trajectory, self._error_so_far))
         self.interrupted = False
+        self._warn_of_last(None)
 
     def abandon(self, test: Test) -> None:
         """Marks a test as not to be flown: `run` skips it. If somebody flies it later, tell its run.
@@ -700,6 +707,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
         latest = self.history[-1] if self._method.memory is not before and self.history else None
         if isinstance(latest, Lesson):
             warn(latest.remarks, stacklevel=3)
+
+    def _warn_of_last(self, asked: Test | None) -> None:
+        """Says at once what speaks against the last flight, while somebody can still look at the rig."""
+        warn(against(self._book.experiments[-1], asked, self.signals), stacklevel=3)
 
     def _error_so_far(self, run: Experiment) -> float | None:
         """On a new run, of the model at the last `ask`: a look must not change it.
