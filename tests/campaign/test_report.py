@@ -158,8 +158,9 @@ def test_advice_is_a_value_of_the_campaign():
 def test_a_twin_that_is_not_to_be_believed_now_gives_no_advice():
     plan = SimpleNamespace(test=1, gain=0.1, predicted=1.0)
 
-    def trusted(*lessons):
-        return assessed(None, None, lessons, None).trusted
+    def trusted(*lessons, commanded=True):
+        twin = SimpleNamespace(law=SimpleNamespace(commanded=commanded))
+        return assessed(twin, None, lessons, None).trusted
 
     def lesson(*remarks, follows=True):
         return SimpleNamespace(asked=[plan], follows=follows, remarks=remarks)
@@ -167,6 +168,8 @@ def test_a_twin_that_is_not_to_be_believed_now_gives_no_advice():
     said, grave = note("known-before", "The earlier twin is kept."), serious("free-run", "It misses.")
     assert trusted(lesson()) and trusted(lesson(grave), lesson(said))
     assert not trusted(lesson(), lesson(said, grave)) and not trusted(lesson(), lesson(follows=False))
+    # All gains are as good on a twin in which no command acts.
+    assert not trusted(lesson(), commanded=False)
 
 
 def test_the_errors_of_the_report_are_those_of_whole_flights():

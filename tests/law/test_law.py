@@ -1,6 +1,9 @@
 """Expressions, what is multiplied out of them, and laws: each against the program that they came from."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -8,6 +11,7 @@ import twinloop as tl
 from oracles import registers_of, run_program, same_bits
 from strategies import exact_programs, program_text, programs, rows
 from twinloop import _core
+from twinloop.law.actuation import HiddenState
 from twinloop.law.expansion import MOST_TERMS, Expansion, written
 from twinloop.law.expressions import Expressions, Node
 from twinloop.law.law import Law
@@ -110,3 +114,17 @@ def test_a_law_gives_its_model_back():
     assert same_bits(again.step(states, commands), model.step(states, commands))
     assert law.actuation.actuators[0].lag == 0.04 and law.actuation.hidden[0].time == 2.0
     assert law.symbols[6:] == ("torque_scaled", "hidden")
+
+
+@pytest.mark.parametrize(
+    ("place", "commands", "acts"),
+    [(0, (), False), (1, (), True), (2, (0,), True), (2, (), False)],
+    ids=["a state", "a command", "what it fills", "what a state fills"],
+)
+def test_whether_a_command_acts_in_a_law(place, commands, acts):
+    signals = tl.Signals([tl.State("level", "m", 1.0)], [tl.Command("pump", "1", (0.0, 1.0))], 0.1)
+    store = Expressions()
+    output = store.add("*", store.input(place), store.constant(2.0))
+    hidden = HiddenState(commands, False, 0.0, 0.5, states=() if commands else (0,))
+    law = Law(signals, "acceleration", store, (output,), SimpleNamespace(hidden=(hidden,)), (0.0,))
+    assert law.commanded is acts

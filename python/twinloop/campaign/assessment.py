@@ -35,8 +35,8 @@ class Advice:
     Args:
         before_test: number of the test that was planned last; the estimate is of that time. None: there is no such
             test.
-        trusted: whether the twin followed its runs at that time and does now, and nothing serious is said against it;
-            if not, there is no advice.
+        trusted: whether the twin followed its runs at that time and does now, nothing serious is said against it, and
+            commands act in it; if not, there is no advice.
         gain: improvement of the quality if it were known which model is right; None without a committee.
         share: `gain` over the quality of the controller to fly; None if either is unknown.
         scatter: standard deviation of the quality of a repeated flight; None if it is unknown.
@@ -63,9 +63,10 @@ def advice(twin: Twin, setup: Setup, lessons: Sequence[Lesson], best: Test | Non
     """
     judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
     gain = judged[-1][0].gain if judged else None
-    # A model that does not follow its own runs, then or now, or that is not to be believed, can advise nobody.
+    # A model that does not follow its own runs, then or now, that is not to be believed, or in which all gains are as
+    # good, can advise nobody.
     believed = lessons[-1].follows and not any(remark.serious for remark in lessons[-1].remarks)
-    trusted = bool(judged) and judged[-1][1].follows and believed
+    trusted = bool(judged) and judged[-1][1].follows and believed and twin.law.commanded
     scatter = None if best is None else _scatter(twin, setup, best)
     quality = None if best is None else best.predicted if best.measured is None else best.measured
     known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0

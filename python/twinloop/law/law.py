@@ -9,7 +9,7 @@ from functools import cached_property
 from twinloop import _core
 from twinloop._ground.values import Value
 from twinloop.law.actuation import Actuation
-from twinloop.law.expressions import UPRIGHT, Expressions, Node
+from twinloop.law.expressions import INPUT, UPRIGHT, Expressions, Node
 from twinloop.law.levels import Levels
 from twinloop.law.reports import Reports, reports_of, with_reports
 from twinloop.signals import RigidBody, Signals
@@ -97,6 +97,18 @@ class Law(Value):
     def symbols(self) -> tuple[str, ...]:
         """A name for each input of the equations."""
         return (*self.signals.state_names, *self.command_symbols, *self.hidden_symbols)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether a command acts in any equation, directly or by a hidden state."""
+        nodes = (self.expressions[number] for number in self.expressions.needed(self.outputs))
+        places = {int(node.value) for node in nodes if node.operation == INPUT}
+        first = self.signals.n_x + self.signals.n_u
+        return any(
+            place < first or bool(self.actuation.hidden[place - first].commands)
+            for place in places
+            if place >= self.signals.n_x
+        )
 
     def derivatives(self) -> tuple[int, ...]:
         """Where outputs are derivatives, the node of each state's (n_x,)."""
