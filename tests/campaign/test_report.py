@@ -172,6 +172,21 @@ def test_a_twin_that_is_not_to_be_believed_now_gives_no_advice():
     assert not trusted(lesson(), commanded=False)
 
 
+def test_a_twin_of_a_system_that_never_answered_follows_nothing_and_gives_no_advice_to_stop():
+    campaign = made()
+    test = campaign.test(GAINS)
+    for _ in range(2):
+        campaign.tell(test, dead(PLANT.run(test)))
+        test = campaign.ask()
+    assert not campaign.twin.follows and not campaign.history[-1].follows
+    assert campaign.advice.stop is None and not campaign.advice.trusted
+    assert {"never-moved", "does-not-follow"} <= {each.code for each in campaign.twin.remarks if each.serious}
+    failed = {check.name for check in campaign.checks() if not check.passed}
+    assert {"follows", "remarks"} <= failed
+    twin, _, following = verdict(campaign)
+    assert "not reliable yet. Commands moved and nothing answered" in twin and "stop" not in following
+
+
 def test_the_errors_of_the_report_are_those_of_whole_flights():
     campaign = begun().run(PLANT, 2)
     off = [run.trajectory.states - campaign.twin.simulate(run.test).states for run in campaign.experiments]

@@ -127,14 +127,14 @@ def squares(states: Floats, others: Floats, signals: Signals) -> Floats:
 
 
 def left(free: float, frozen: float, noise: float) -> bool:
-    """Whether a free run does not follow its flight.
+    """Whether a free run does not follow its flight. One in which nothing ever moves is followed by nothing.
 
     Args:
         free: its mean square error; infinite where it diverges.
         frozen: that of the model that never moves.
         noise: of the sensors, in the same unit.
     """
-    return not free - noise <= WRONG * max(frozen - noise, 2.0 * noise)
+    return frozen == 0.0 or not free - noise <= WRONG * max(frozen - noise, 2.0 * noise)
 
 
 def fit_table(signals: Signals, read: Floats, free: Floats | None) -> FitTable:

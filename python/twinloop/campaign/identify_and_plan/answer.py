@@ -148,7 +148,8 @@ def _lost(
         parts = followed.lengths[short], [flights[j] for j in short]
         each, still = of_each_state(model, *parts, limits, workers)
         for j, off, held in zip(short, each.tolist(), still.tolist(), strict=True):
-            lost[j] = any(map(left, off, held, seen.tolist()))
+            # A state that stays where it is, as it should, is followed.
+            lost[j] = any(o > 0.0 and left(o, h, n) for o, h, n in zip(off, held, seen.tolist(), strict=True))
     numbers: list[int] = np.flatnonzero(lost).tolist()
     pulsed = in_pulses([flights[j] for j in numbers])
     again = [j for j in numbers if flights[j].number in pulsed]
