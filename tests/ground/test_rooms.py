@@ -19,13 +19,13 @@ FRONTS = {
     "autopilots": "declared files sweep",
     "campaign": "assessment campaign_file certificate cost from_logs history keeping presets remaining setup",
     "campaign/coevolution": "method search",
-    "campaign/data": "declared lateness levels readings reports sent wrapped",
+    "campaign/data": "declared gains lateness levels readings reports sent wrapped",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "rivals steps unseen use"
     ),
     "campaign/identify_and_plan": "method",
-    "controllers": "custom family gains state_feedback",
+    "controllers": "custom family gains riccati state_feedback",
     "faces": "cli console files notebook plots result run_info terminal",
     "faces/dashboard": "command",
     "faces/figures": "catalogue figure plots saving style svg units",

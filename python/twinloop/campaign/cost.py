@@ -47,7 +47,7 @@ def cost(book: Logbook) -> Cost:
     Args:
         book: of the campaign.
     """
-    asked = [run for run in book.experiments if run.test is not None]
+    asked = [run for run in book.experiments if run.number is not None]
     recorded_failures = sum(failure.recorded for failure in book.failures)
     qualities = [
         run.quality

@@ -8,6 +8,7 @@ from typing import Literal
 from twinloop._experiment.envelope import readings_leave, usages_of
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.gains import FlownOtherwise
 from twinloop.law.actuation import HiddenState, renewed_hidden
 from twinloop.objectives import normalised_error
 from twinloop.records import Record, Recorded
@@ -27,7 +28,8 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     """One run on the system.
 
     Args:
-        replayed: what a twin flies for the comparison: the test, or the recorded commands.
+        replayed: what a twin flies for the comparison: the test, or the recorded commands, which are those of a test
+            that was flown with other gains too.
         trajectory: the measured run.
         before: closed-loop error on this run of the twin at the last `ask`, over steps and states, each in units of its
             scale (the preset "paper": SI units squared); None if there was no `ask` yet.
@@ -49,13 +51,14 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def test(self) -> Test | None:
-        """The test; None for an attached run."""
+        """The test; None for an attached run, and where other gains were flown than the test asks for."""
         return self.replayed if isinstance(self.replayed, Test) else None
 
     @property
     def number(self) -> int | None:
-        """Number of the test; None for an attached run."""
-        return None if self.test is None else self.test.number
+        """Number of the test, with whatever gains it was flown; None for an attached run."""
+        asked = self.replayed.asked if isinstance(self.replayed, FlownOtherwise) else self.test
+        return None if asked is None else asked.number
 
     @property
     def complete(self) -> bool:

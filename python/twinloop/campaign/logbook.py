@@ -281,7 +281,7 @@ class Logbook(Recorded, kind="logbook"):
         Args:
             run: of a test of this campaign, or an attached run.
         """
-        counting = as_it_counts(run, len(self.recorded), self.withdrawals)
+        counting = as_it_counts(run, len(self.recorded), self.withdrawals, self.setup)
         self.selected = with_run(self.selected, counting.replayed, counting.trajectory)
         self.recorded.append(run)
         self.experiments.append(counting)
@@ -351,7 +351,7 @@ class Logbook(Recorded, kind="logbook"):
         """What counts, of all that was entered."""
         runs, failures = ({getattr(each, key) for each in self.withdrawals} for key in ("run", "failure"))
         self.experiments = [
-            as_it_counts(run, place, self.withdrawals)
+            as_it_counts(run, place, self.withdrawals, self.setup)
             for place, run in enumerate(self.recorded)
             if place not in runs
         ]
@@ -363,7 +363,7 @@ class Logbook(Recorded, kind="logbook"):
     @property
     def flown(self) -> set[int]:
         """Numbers of the tests that were flown, whatever became of them."""
-        told = {run.test.number for run in self.experiments if run.test is not None}
+        told = {run.number for run in self.experiments if run.number is not None}
         return told | {failure.test.number for failure in self.failures}
 
     @property
@@ -374,7 +374,7 @@ class Logbook(Recorded, kind="logbook"):
     @property
     def runs(self) -> int:
         """Runs of tests on the system, the failed ones too, and withdrawn ones until their test is told anew."""
-        told = sum(run.test is not None for run in self.experiments)
+        told = sum(run.number is not None for run in self.experiments)
         return told + sum(not failure.recorded for failure in self.failures) + len(self.only_withdrawn)
 
     @property

@@ -32,7 +32,7 @@ def status(book: Logbook, test: object) -> str:
         InvalidInput: a test of another campaign.
     """
     number = book.own(test).number
-    runs = _runs(book, number)
+    runs = [run for run in book.experiments if run.number == number]
     if failed(book, number):
         return "failed"
     if runs:
@@ -118,7 +118,8 @@ def unfit(book: Logbook) -> list[Floats]:
     Args:
         book: of the campaign.
     """
-    return [book.tests[number].genes for number in sorted(book.flown) if not finishes(book, number)]
+    flown = [number for number in sorted(book.flown) if _told(book, number)]
+    return [book.tests[number].genes for number in flown if not finishes(book, number)]
 
 
 def borne(book: Logbook) -> int:
@@ -132,7 +133,7 @@ def borne(book: Logbook) -> int:
     """
     count, signals = 0, book.setup.signals
     for test in reversed(book.tests):
-        if test.hold_back is None or status(book, test) in ("asked", "abandoned"):
+        if test.hold_back is None or not _told(book, test.number):
             continue
         runs = _runs(book, test.number)
         went_on = max((test.hold_back.overrun(signals, run.trajectory.states) for run in runs), default=0.0)
@@ -259,5 +260,11 @@ def _asked_after(book: Logbook, turn: Turn) -> tuple[Any, ...]:
     )
 
 
+def _told(book: Logbook, test: int) -> bool:
+    """Whether anything was told of the gains of a test."""
+    return bool(_runs(book, test)) or failed(book, test)
+
+
 def _runs(book: Logbook, test: int) -> list[Experiment]:
-    return [run for run in book.experiments if run.number == test]
+    """Runs of a test under its own gains."""
+    return [run for run in book.experiments if run.test is not None and run.test.number == test]

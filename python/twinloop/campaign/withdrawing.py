@@ -7,8 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from twinloop._ground.texts import text
+from twinloop.campaign.data.gains import flown_otherwise
 from twinloop.campaign.excited import as_excited, excited
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
+from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
 from twinloop.test import Test
 from twinloop.trajectory import equal_runs
@@ -52,15 +54,20 @@ def withdrawal_of(book: Logbook, which: object, reason: str, known: Sequence[int
     return Withdrawal(reason, test, run, failure, len(book.recorded), tuple(left), tuple(planned))
 
 
-def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal]) -> Experiment:
+def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal], setup: Setup) -> Experiment:
     """A run as it was flown, without what was predicted of it by a twin that had learnt a withdrawn flight.
 
     Args:
         run: as it was recorded.
         place: among all that were.
         withdrawals: of the campaign.
+        setup: of the campaign. The preset "paper" learns from tests of its controllers only, as they were asked for.
     """
     test = run.test
+    if test is not None and setup.preset != "paper":
+        otherwise = flown_otherwise(test, run.trajectory, setup.controller)
+        if otherwise is not None:
+            return replace(run, replayed=otherwise, before=None, final_distance=None, quality=None)
     if test is not None:
         flown = as_excited(test, excited(test, run.trajectory))
         # Of what was not asked for nothing was predicted.

@@ -208,7 +208,7 @@ def _runs(figure: Any, campaign: Campaign) -> None:
     for column, each in enumerate(found.beside):
         run, predicted = each.run, each.simulated
         start = run.trajectory.t[0]
-        title = "attached" if run.test is None else f"test {run.test.number}"
+        title = "attached" if run.number is None else f"test {run.number}"
         if run.test is not None and best is not None and run.test.number == best.number:
             title += " (best)"
         grid[0, column].set_title(title, loc="left")

@@ -186,7 +186,7 @@ def test_two_commands_exchanged_among_four_are_found_and_named():
     def recorded(columns):
         commands = run.commands[:, columns]
         flight = tl.Trajectory(run.t, run.states, commands)
-        return SimpleNamespace(test=test, number=0, trajectory=flight)
+        return SimpleNamespace(test=test, replayed=test, number=0, trajectory=flight)
 
     assert other_commands([recorded([0, 1, 2, 3])]) == []
     for columns in ([1, 0, 2, 3], [2, 1, 0, 3], [0, 3, 2, 1]):

@@ -11,6 +11,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import in_unit
 from twinloop.campaign.data.declared import against_derivatives
+from twinloop.campaign.data.gains import FlownOtherwise, from_other_gains
 from twinloop.campaign.data.lateness import late
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.sent import (
@@ -158,8 +159,15 @@ def against(
     others = other_commands([flight])
     pair = exchanged(flight) if others else None
     names = [signals.commands[i].name for i in pair or ()]
+    if isinstance(flight.replayed, FlownOtherwise):
+        asked = flight.replayed.flown
     excitations = () if asked is None else from_another_excitation(asked.number, excited(asked, run))
-    return [*(each for each in found if each.serious), *from_other_controllers(others, names), *excitations]
+    return [
+        *(each for each in found if each.serious),
+        *from_other_controllers(others, names),
+        *from_other_gains([flight]),
+        *excitations,
+    ]
 
 
 def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) -> Iterator[Remark]:

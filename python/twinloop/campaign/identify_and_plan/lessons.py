@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.streams import Unit
+from twinloop.campaign.data.gains import from_other_gains
 from twinloop.campaign.data.levels import levels_said
 from twinloop.campaign.data.sent import other_commands
 from twinloop.campaign.history import Experiment, Lesson
@@ -69,6 +70,7 @@ def lesson_of(
             *shortened(selected, signals.dt),
             *stand_ins(identified.actuation, signals, explained),
             *levels_said(identified.model, signals),
+            *from_other_gains(book.experiments),
             *diagnostics_of(book.experiments, signals, book.setup.steps, found),
         ),
         recurring=found.recurring,
