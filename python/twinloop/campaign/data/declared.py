@@ -91,8 +91,8 @@ def _beside_a_constant(
     walks = sum(float(walk(noise[i], signals.dt, len(states) - 1)) for states in on)
     rows = sum(len(states) for states in on)
     scatter = WALKED * WALKED * walks / rows if constant[0] else MOVED * MOVED * float(noise[j])
-    least = SEEN * SEEN * signals.states[j].scale ** 2
-    return "does not change as" if size > max(least, scatter) else ""
+    least = SEEN * signals.states[j].scale
+    return "does not change as" if size > max(least * least, scatter) else ""
 
 
 def _as_a_body(runs: Sequence[Run], signals: Signals, noise: Floats) -> RigidBody | None:
