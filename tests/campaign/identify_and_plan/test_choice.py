@@ -37,7 +37,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
-    fared=KEPT, in_gusts=None, delayed=None,
+    misses=False, fared=KEPT, in_gusts=None, delayed=None,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -67,7 +67,7 @@ def chosen(
     blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
     late = [] if delayed is None else ["delayed"]
     committee = Committee([None], np.zeros(2), trusted, late, explained, blown)
-    choice = Choice(planner, committee, book, 4, confidence)
+    choice = Choice(planner, committee, book, 4, confidence, misses)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
         unfit=lambda book: list(unfit), on_task=lambda book, test: True,
@@ -81,6 +81,15 @@ def chosen(
         max(0.5 / 5.0, moved.risk, fared.risk if (found.genes == FLOWN.genes).all() else 0.0)
     )
     return ("tuned" if (found.genes == TUNED).all() else "flown"), told[0] if gusts is UNMOVED else told
+
+
+def test_gains_of_a_twin_that_misses_its_flights_fly_before_they_are_recommended():
+    came_true = experiment(1.0)
+    answer, reason = chosen(0.5, experiments=[came_true], misses=True)
+    assert answer == "flown" and "have to fly before they are recommended" in reason
+    # While only the first controller has flown they are recommended, as those of a twin that explains its flights are.
+    assert chosen(0.5, misses=True)[0] == "tuned"
+    assert chosen(0.5, experiments=[came_true])[0] == "tuned"
 
 
 def test_gains_that_are_better_by_more_than_any_miss_are_taken_whatever_predictions_missed():

@@ -46,6 +46,7 @@ class Choice:
         draws: of the sensors' noise.
         confidence: share of members and draws that must find tuned gains better than the best flown, by half a percent
             or more, and by more than predictions have missed of late.
+        misses: whether the twin misses its own flights.
     """
 
     planner: Planner
@@ -53,6 +54,7 @@ class Choice:
     book: Logbook
     draws: int
     confidence: float
+    misses: bool = False
 
     def between(self, tuned: Floats, best: Test | None) -> Test:
         """The controller to fly, without excitation, for the campaign's own task.
@@ -136,6 +138,8 @@ class Choice:
             return "the twin predicted flights to their end, and each of them was cut"
         if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
             return "a flight with gains close to those that the twin prefers failed or was cut"
+        if flown is not None and self.misses and self._tuned_have_flown():
+            return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
         if self._no_gains_count(members, judged):
             return "the gains have no effect on the twin, since no command acts in it"
         off = off_start(self.book)
@@ -150,6 +154,14 @@ class Choice:
         if self._moved(tuned).left > (0 if flown is None else self._moved(flown.genes).left):
             return "in disturbances as the flights felt them, those preferred by the twin leave the envelope"
         return ""
+
+    def _tuned_have_flown(self) -> bool:
+        """Whether gains that a twin has proposed completed a flight: others are then no longer the only way on."""
+        flights = ((run.test, run.quality) for run in self.book.experiments)
+        return any(
+            test is not None and test.predicted is not None and quality is not None
+            for test, quality in flights
+        )
 
     def _no_gains_count(self, members: Sequence[_core.Model], judged: Judged) -> bool:
         """Whether every member flies to the bit as well in two corners of the gains' box as with the tuned ones."""

@@ -11,7 +11,7 @@ from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.elsewhere import NOWHERE, Elsewhere
-from twinloop.campaign.identify_and_plan.misses import Miss
+from twinloop.campaign.identify_and_plan.misses import FREE_RUN, Miss
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.campaign.identify_and_plan.track_record import NEARLY, missed_in_a_row
 from twinloop.remarks import Remark, note, serious
@@ -236,6 +236,6 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
         else "There is an effect that no term describes. Do not trust the twin outside these flights."
     )
     yield serious(
-        "free-run",
+        FREE_RUN,
         f"In free run over the {runs} run{'s' if runs > 1 else ''} so far, the twin {what}. {why}",
     )

@@ -250,6 +250,7 @@ class IdentifyAndPlan:
             book,
             self.options.draws,
             self.options.confidence,
+            self._latest().misses,
         )
         if at_once:
             tuned, note = known_gains(self.memory, best)

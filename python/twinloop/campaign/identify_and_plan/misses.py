@@ -29,6 +29,8 @@ DRAWS = 8
 """Of noise and disturbances, by which it is said how far these take a flight."""
 TIMES = 3.0
 """Times further from a flight than these that a free run is no more explained by them."""
+FREE_RUN = "free-run"
+"""Code of the remark that says that a twin misses its own flights."""
 RELEVANT = 0.03
 """Misses below this share of how far a flight went do not matter."""
 
