@@ -11,7 +11,8 @@ before. A *stop* is then a function
 
 1. that made the coefficient, or what went into it, or that called, over any number of others, a function that did;
 2. that returns a value which holds the coefficient, as a number or as text; or
-3. that is given the run while it is told, and returns or stores a value which holds it.
+3. that is given the run while it is told, and returns or stores a value which holds it; not on behalf of one that does
+   neither, such as one that looks at the run and warns.
 
 Not counted are methods between double underscores, and accessors: one expression without a call of another function of
 the package. A function within a function is read with it. Numbers of fewer than 12 characters are those that people
@@ -31,7 +32,7 @@ import copy
 import re
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from types import CodeType, FrameType
@@ -315,6 +316,16 @@ def watched(sought: Callable[[object], bool], given: list[object], act: Callable
     return watch
 
 
+def _goes_on(call: Call, handed: Sequence[Call]) -> bool:
+    """Whether what a call hands on goes on: all that called it, but for the outermost, hand it on, too."""
+    above = call.caller
+    while above is not None and above.caller is not None:
+        if above not in handed:
+            return False
+        above = above.caller
+    return True
+
+
 def path(system: str, options: dict[str, object]) -> tuple[str, list[tuple[Name, Name | None]]]:
     """The coefficient as it is printed, and each stop with the one that it is called by, in the order they are met."""
     campaign, test, run = campaign_of(system, options)
@@ -328,7 +339,7 @@ def path(system: str, options: dict[str, object]) -> tuple[str, list[tuple[Name,
     told = watched(
         lambda each: isinstance(each, float) and each == reading, [], lambda: campaign.tell(test, run)
     )
-    calls = [(0, call) for call in told.handed if call.given]
+    calls = [(0, call) for call in told.handed if call.given and _goes_on(call, told.handed)]
     learnt = watched(
         lambda each: (
             abs(each) == value if isinstance(each, float) else isinstance(each, str) and text in each

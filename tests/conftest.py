@@ -1,5 +1,6 @@
 """Shared fixtures: the quadrotor, a small rig with one axis, and campaigns that are over in no time."""
 
+import signal
 import sys
 from pathlib import Path
 
@@ -14,6 +15,9 @@ from twinloop import _core
 
 settings.register_profile("twinloop", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile("twinloop")
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, and some tests press it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 TINY = {
     "model_population": 20,

@@ -15,6 +15,13 @@ from twinloop.faces.result import summary, to_json
 from twinloop.faces.text import render
 
 GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
+
+
+def in_scales(off):
+    """Mean square, each state in units of its scale."""
+    return np.mean((off / [state.scale for state in SIGNALS.states]) ** 2)
+
+
 # Flights that nobody asked for
 
 
@@ -30,10 +37,10 @@ def test_an_attached_flight_is_learnt_from_and_judged_under_its_recorded_command
     assert same_bits(run.replayed.commands, record.commands)
     free = twin.simulate(twin.as_flown(run.replayed, record))
     assert row.test is None
-    assert row.closed_loop == pytest.approx(np.mean((free.states[1:] - record.states[1:]) ** 2), rel=1e-9)
+    assert row.closed_loop == pytest.approx(in_scales(free.states[1:] - record.states[1:]), rel=1e-9)
     states = twin.model.states_of(record.states)
     one_step = twin.predict(states[:-1], record.commands)
-    assert row.open_loop == pytest.approx(np.mean((one_step - states[1:]) ** 2), rel=1e-9)
+    assert row.open_loop == pytest.approx(in_scales(one_step - states[1:]), rel=1e-9)
     assert row.normalised < 0.05
 
 
@@ -48,7 +55,7 @@ def test_commands_beyond_a_bound_are_flown_as_they_were_sent():
     free = twin.simulate(twin.as_flown(run.replayed, beyond))
     assert same_bits(free.commands, beyond.commands)
     (row,) = twin.errors
-    assert row.closed_loop == pytest.approx(np.mean((free.states[1:] - beyond.states[1:]) ** 2), rel=1e-9)
+    assert row.closed_loop == pytest.approx(in_scales(free.states[1:] - beyond.states[1:]), rel=1e-9)
     assert [state.rmse for state in twin.fit(beyond)] == pytest.approx(
         np.sqrt(np.mean((free.states[1:] - beyond.states[1:]) ** 2, axis=0)), rel=1e-9
     )

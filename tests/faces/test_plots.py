@@ -80,7 +80,7 @@ def test_the_share_inside_the_band_is_counted_from_the_readings(campaign, drawn)
 def test_a_target_that_no_flight_came_near_is_on_the_axis(campaign):
     run = campaign.experiments[1]
     far = run.test.target_state + 9.0
-    run = SimpleNamespace(test=replace(run.test, target_state=far), trajectory=run.trajectory)
+    run = SimpleNamespace(number=1, test=replace(run.test, target_state=far), trajectory=run.trajectory)
     beside = SimpleNamespace(run=run, simulated=run.trajectory, places=None)
     found = SimpleNamespace(twin=SimpleNamespace(noise=None), best=None, beside=[beside])
     figure = Figure()

@@ -22,7 +22,7 @@ FRONTS = {
     "campaign/data": "declared gains lateness levels readings reports sent wrapped",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
-        "rivals steps unseen use"
+        "reaching rivals steps unseen use"
     ),
     "campaign/identify_and_plan": "method",
     "controllers": "custom family gains riccati state_feedback",
@@ -31,7 +31,7 @@ FRONTS = {
     "faces/figures": "catalogue figure plots saving style svg units",
     "faces/report": "command page source",
     "faces/report/tables": "controller flights table twin",
-    "faces/text": "table twin verdict words",
+    "faces/text": "controller table twin verdict words",
     "guard": "guarded",
     "identification": "identified identify outliers records remarks settings",
     "identification/fit": "alternation committee fitting models predictions promises tuning",

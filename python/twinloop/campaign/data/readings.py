@@ -23,6 +23,8 @@ COUNTS = 1.5
 """Counts of a rounded sensor that it moved last before it froze: by one of them it also comes to rest by itself."""
 WHITE = 1.5
 """Von Neumann's ratio, 2 for white noise and near 0 for what moves smoothly, above which nothing else is seen."""
+SOME = 20
+"""Readings of a run at least that tell noise from motion."""
 
 
 def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]:
@@ -67,7 +69,8 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
                 " learnt; check that the command that was sent was logged.",
             )
     moved = [i for i in range(signals.n_x) if any(np.ptp(run.states[:, i]) > 0.0 for run in runs)]
-    if moved and all(ratio([run.states[:, i] for run in runs]) > WHITE for i in moved):
+    enough = any(len(run.states) >= SOME for run in runs)
+    if moved and enough and all(ratio([run.states[:, i] for run in runs]) > WHITE for i in moved):
         yield serious(
             "only-noise",
             "Readings change from row to row as much as over whole runs: they contain only noise; check"
