@@ -106,6 +106,22 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
 
 
+def test_commands_that_are_advised_quote_names_with_blanks(folder):
+    begun = run("new", "my rig.toml")
+    assert "twinloop ask 'my rig.db'" in begun.stdout
+    written = Path("my rig.toml").read_text(encoding="utf-8")
+    assert "twinloop ask 'my rig.db'\n" in written and "twinloop run 'my rig.toml';" in written
+    Path("rig.toml").replace("my rig.toml")
+    assert "twinloop tell 'my rig.db' 0 FLIGHT.csv" in run("ask", "my rig.db").stdout
+    flown(tl.Campaign.load("my rig.db", read_only=True).tests[0])
+    assert run("tell", "my rig.db", "0", "flight.csv").exit_code == 0
+    assert "twinloop withdraw 'my rig.db' 0" in run("tell", "my rig.db", "0", "--failed", "motor").stderr
+    assert "twinloop learn 'my rig.db'." in run("show", "my rig.db").stdout
+    assert "twinloop show 'my rig.db'\n" in run("learn", "my rig.db").stdout
+    taken = run("withdraw", "my rig.db", "0", "--reason", "degrees")
+    assert "twinloop tell 'my rig.db' 0 FLIGHT.csv" in taken.stdout
+
+
 def test_rows_after_the_twin_has_diverged_say_so():
     campaign = lives.new("default")
     test = campaign.test(lives.PENDULUM_GAINS)

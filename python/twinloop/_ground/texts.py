@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from twinloop.errors import InvalidInput
 
 
@@ -38,6 +40,15 @@ def whole_characters(words: str) -> str:
         words: from anybody, such as those of a command.
     """
     return words.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def to_type(*words: object) -> str:
+    """A command of twinloop as a shell takes it: names with blanks are quoted.
+
+    Args:
+        words: verb and arguments.
+    """
+    return shlex.join(["twinloop", *map(str, words)])
 
 
 def one_line(text: str) -> str:

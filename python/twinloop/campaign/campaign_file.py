@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from twinloop._ground.texts import to_type
 from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
 from twinloop.campaign.presets import PRESETS
@@ -36,7 +37,7 @@ SECTIONS = (
 TASK = ("initial_state", "target_state", "duration")
 CAMPAIGN = ("preset", "seed", "goal", "quality", "weights")
 TEMPLATE = """\
-# A campaign of twinloop. Fill in what your system is, then: twinloop ask {store}
+# A campaign of twinloop. Fill in what your system is, then: {ask}
 # Units are SI and radians; names of states and commands become symbols in equations.
 
 dt = 0.05                        # period of the commands, s
@@ -100,7 +101,7 @@ seed = 0
 # rate = "vehicle_angular_velocity.xyz[1]"
 # torque = "vehicle_torque_setpoint.xyz[1]"
 
-# [system]                       # a system that flies by program: twinloop run {file}; leave it out if a person flies
+# [system]                       # a system that flies by program: {run}; leave it out if a person flies
 # use = "rig:Rig"                # a class in rig.py beside this file, which is run; or a name: {names}
 # timeout = 60.0                 # s that a run may take
 # [system.arguments]             # its arguments
@@ -120,8 +121,8 @@ def template(store: str) -> str:
     lines = [
         f"# {field.name} = {_toml(getattr(options, field.name))}" for field in dataclasses.fields(options)
     ]
-    file, names = Path(store).with_suffix(".toml"), ", ".join(NAMED)
-    return TEMPLATE.format(store=store, file=file, names=names) + "\n".join(lines) + "\n"
+    ask, run = to_type("ask", store), to_type("run", Path(store).with_suffix(".toml"))
+    return TEMPLATE.format(ask=ask, run=run, names=", ".join(NAMED)) + "\n".join(lines) + "\n"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,7 +163,7 @@ class CampaignFile:
         if self.flies is None:
             raise NotAvailable(
                 f"File {self.path}: expected a section [system] that names what flies, found none; add it, or fly"
-                f" yourself: twinloop ask {self.path.with_suffix('.db')}."
+                f" yourself: {to_type('ask', self.path.with_suffix('.db'))}."
             )
         return system_named(
             self.flies.use, self.flies.arguments, self.arguments["signals"], self.path.resolve().parent

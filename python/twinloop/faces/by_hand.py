@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
 import click
 
+from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
@@ -40,7 +40,7 @@ def new(file: Path, as_json: bool) -> None:
         raise InvalidInput(f"File {file}: expected none there, found one; choose another name, or remove it.")
     store = file.with_suffix(".db")
     write_text(file, template(str(store)))
-    text = f"Wrote {file}: fill it in, then ask for the first test: twinloop ask {store}"
+    text = f"Wrote {file}: fill it in, then ask for the first test: {to_type('ask', store)}"
     answer({"files": [str(file)], "store": str(store)}, text, as_json)
 
 
@@ -80,7 +80,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
         if not campaign.experiments:
             raise InvalidInput(
                 "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
-                f" twinloop ask {shown_name(store)}."
+                f" {to_type('ask', shown_name(store))}."
             )
         shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
         if as_json:
@@ -88,7 +88,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
             return
         click.echo(
             f"{len(shown)} alternatives, the best first. Fly them in any order and record each with tell;"
-            f" for a test that you will not fly: twinloop abandon {shown_name(store)} TEST\n"
+            f" for a test that you will not fly: {to_type('abandon', shown_name(store), 'TEST')}\n"
         )
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
@@ -189,9 +189,7 @@ def _told(
 
 def _aborted(store: str, test: int, log: Path, why: str) -> str:
     """The command that tells an aborted flight."""
-    return shlex.join(
-        ["twinloop", "tell", shown_name(store), str(test), "--aborted", str(log), "--reason", why]
-    )
+    return to_type("tell", shown_name(store), test, "--aborted", log, "--reason", why)
 
 
 @click.command()
@@ -266,7 +264,7 @@ def _campaign(store: str, threads: int | None = None) -> Campaign:
         return Campaign.load(store, threads=threads)
     raise InvalidInput(
         f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
-        f" twinloop new {file}."
+        f" {to_type('new', file)}."
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinloop._ground.texts import to_type
 from twinloop.campaign.history import Lesson
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -73,5 +74,5 @@ def not_reliable(store: str, remarks: Sequence[Remark]) -> list[str]:
         return []
     codes = ", ".join(dict.fromkeys(remark.code for remark in remarks))
     return [
-        f"The twin is not reliable yet ({codes}): {remarks[0].sentence} twinloop show {store} has the whole."
+        f"The twin is not reliable yet ({codes}): {remarks[0].sentence} {to_type('show', store)} has the whole."
     ]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
+from twinloop._ground.texts import to_type
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
 from twinloop.faces.text import quality_words, table
@@ -237,5 +238,5 @@ def sheet(
     lines += not_reliable(store, against)
     lines.append(reason(test, predicted is not None))
     lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
-    lines.append(f"  twinloop tell {store} {test.number} FLIGHT.csv")
+    lines.append(f"  {to_type('tell', store, test.number, 'FLIGHT.csv')}")
     return "\n".join(lines) + "\n"

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import behind
 from twinloop.campaign.keeping import look
@@ -80,7 +81,7 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
             _ = campaign.best_test
-        text = f"Learnt from {counted(campaign)}: twinloop show {shown_name(store)}\n"
+        text = f"Learnt from {counted(campaign)}: {to_type('show', shown_name(store))}\n"
         _print({"learnt": len(campaign.experiments)}, text, as_json)
 
 
@@ -185,7 +186,7 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
     if missing:
         lines.append(
             f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}; to learn now:"
-            f" twinloop learn {shown_name(store)}."
+            f" {to_type('learn', shown_name(store))}."
         )
     for key, words in (("waiting", "waiting to be flown"), ("failed", "failed"), ("abandoned", "abandoned")):
         if facts[key]:

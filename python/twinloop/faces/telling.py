@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput
 from twinloop.logs import Log, read_log
@@ -140,9 +141,10 @@ def tell_failed(
     test = numbered(campaign, number)
     status = campaign.status(test)
     if status in ("flown", "aborted"):
+        withdraw = to_type("withdraw", campaign.store or "STORE", number, "--reason", "WHY")
         raise InvalidInput(
             f"Test {number}: expected one without a recorded flight, found one that was {status}; if that was recorded"
-            f" by mistake, withdraw it first: twinloop withdraw {campaign.store or 'STORE'} {number} --reason WHY."
+            f" by mistake, withdraw it first: {withdraw}."
         )
     if log is None and any((told.test.number, told.reason) == (number, reason) for told in campaign.failures):
         raise InvalidInput(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 
+from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput
@@ -48,7 +49,7 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
             *given_up_words(campaign),
         ]
         if test is not None:
-            lines.append(f"Its right log, if there is one: twinloop tell {shown} {test} FLIGHT.csv")
+            lines.append(f"Its right log, if there is one: {to_type('tell', shown, test, 'FLIGHT.csv')}")
         answer(facts, "\n".join(lines), as_json)
 
 

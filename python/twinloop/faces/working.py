@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from twinloop._ground.arrays import number
+from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky
 from twinloop.faces.console import Watch
@@ -122,7 +123,7 @@ def work(
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
         if (campaign.interrupted or stopped) and campaign.store is not None:
-            click.echo(f"Saved. Continue with: twinloop resume {campaign.store}", err=True)
+            click.echo(f"Saved. Continue with: {to_type('resume', campaign.store)}", err=True)
         if stopped and not campaign.experiments:
             return 1
         if not campaign.experiments or knows_nothing(campaign):
