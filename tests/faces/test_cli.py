@@ -10,11 +10,13 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 import twinloop
 from command import hearing_ctrl_c, invoke, same_but_for_run_info, twinloop_command
 from twinloop.faces.cli import main
+from twinloop.logs import write_columns
 
 PAPER = ["run", "quadrotor", "--preset", "paper"]
 SMALL = [*PAPER, "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
@@ -381,6 +383,19 @@ def test_closed_streams_end_with_the_result_and_its_exit_code(tmp_path):
     # Nobody flies for a result that nobody can see.
     nowhere = closed(*TINY, streams=[1])
     assert nowhere.returncode == 2 and "pass --output" in nowhere.stderr
+
+
+def test_a_file_that_a_full_disk_refuses_is_named(monkeypatch, tmp_path):
+    def full(*arguments, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    file = tmp_path / "my rig.toml"
+    done = invoke("new", str(file))
+    assert done.exit_code == 1 and f"No space left on device: {str(file)!r}" in done.stderr
+    if Path("/dev/full").exists():
+        with pytest.raises(OSError, match="/dev/full"):
+            write_columns(Path("/dev/full"), {"t": np.zeros(2)})
 
 
 def test_a_result_that_cannot_be_written_is_printed(monkeypatch, tmp_path):

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from twinloop.errors import InvalidInput
+from twinloop.errors import InvalidInput, writing
 from twinloop.faces.plots import SUFFIXES, require
 
 
@@ -70,7 +70,8 @@ def write_text(path: Path, text: str) -> None:
     """
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
+        with writing(path):
+            draft.write_text(text, encoding="utf-8")
+            draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)

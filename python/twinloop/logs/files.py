@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
+from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at, writing
 from twinloop.logs.headers import advice, listed
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
@@ -174,7 +174,7 @@ def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
         OSError: the file cannot be written.
     """
     rows = max(len(values) for values in columns.values())
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in range(rows):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from twinloop.errors import NotAvailable, unknown
+from twinloop.errors import NotAvailable, unknown, writing
 from twinloop.faces.figures.figure import Figure
 from twinloop.faces.figures.style import LIGHT
 from twinloop.faces.figures.svg import drawing
@@ -60,8 +60,9 @@ def written(contents: bytes, path: Path) -> None:
     """
     draft = path.with_name(f".{path.name}.draft")
     try:
-        draft.write_bytes(contents)
-        draft.replace(path)
+        with writing(path):
+            draft.write_bytes(contents)
+            draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
 
