@@ -446,7 +446,7 @@ def test_the_store_says_what_results_come_from(path, pendulum):
 def test_a_second_writer_is_refused_and_a_reader_is_not(path, pendulum):
     campaign = flown(stored(path), pendulum)
     for second in (lambda: stored(path), lambda: tl.Campaign.load(path), lambda: campaign.save(path)):
-        with pytest.raises(tl.StoreFailure, match=f"process {os.getpid()}.*read_only=True"):
+        with pytest.raises(tl.StoreFailure, match=f"process {os.getpid()}.*twinloop show, read_only=True"):
             second()
     assert len(tl.Campaign.load(path, read_only=True).experiments) == 1
     campaign.close()

@@ -25,7 +25,7 @@ def taken_twin(
     if failed:
         raise NotTrusted(
             f"Export: expected a twin that holds its checks, found: {' '.join(map(str, failed))} Learn from more"
-            " tests, or pass force=True (--force)."
+            " tests, or pass --force (force=True in Python)."
         )
     setup = campaign.setup
     episode = Episode(setup.initial_state, setup.final_target, setup.steps, setup.limits)

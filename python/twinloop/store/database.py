@@ -21,7 +21,10 @@ BUSY_SECONDS = 30.0
 SMALLEST_ROOM = 1 << 16
 """Bytes on a disk below which it counts as full: the index of a log takes half of that."""
 ROOM = ("room on the disk", "free some, then do the same again")
-RIGHT = ("the right to write", "give it for the file and its folder, or read with read_only=True")
+RIGHT = (
+    "the right to write",
+    "give it for the file and its folder, or only read it: twinloop show, read_only=True in Python",
+)
 REFUSALS = (
     (ROOM[0], *ROOM),
     ("full", *ROOM),

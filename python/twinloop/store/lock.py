@@ -93,8 +93,8 @@ class AdvisoryLock:
 def taken(what: str, holder: str) -> StoreFailure:
     """The error for a campaign that somebody else writes."""
     return StoreFailure(
-        f"Store: expected to be the only one who writes {what}, found {holder} that does; end that one first, or look"
-        " at it with read_only=True."
+        f"Store: expected to be the only one who writes {what}, found {holder} that does; end that one first, or only"
+        " look: twinloop show, read_only=True in Python."
     )
 
 

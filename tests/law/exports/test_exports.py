@@ -270,7 +270,7 @@ def test_a_twin_that_does_not_follow_its_flights_is_exported_only_by_force(tmp_p
     bad = [TestErrors(i, 1.0, 2.0, 0.9, None, 2.0) for i in range(2)]
     twin = twin_of(PENDULUM, errors=bad)
     assert not twin.follows
-    with pytest.raises(tl.NotTrusted, match="force=True"):
+    with pytest.raises(tl.NotTrusted, match=r"pass --force \(force=True in Python\)"):
         twin.export(tmp_path / "twin.py")
     assert not (tmp_path / "twin.py").exists()
     assert twin.export(tmp_path / "twin.py", force=True) == (tmp_path / "twin.py",)

@@ -88,7 +88,8 @@ def check_sympy(source: str, law: Law, flights: Sequence[Trajectory]) -> None:
             if not (off <= CLOSE["double"]).all():
                 raise NotAvailable(
                     f"Export, SymPy: expected the twin's own numbers to 1e-9, found {found} for {outputs}: a division"
-                    " is protected there, which SymPy's is not. Pass force=True to export it anyway."
+                    " is protected there, which SymPy's is not. Pass --force (force=True in Python) to export it"
+                    " anyway."
                 )
 
 
@@ -163,5 +164,5 @@ def _check(expected: str, unit: str, differences: Iterable[Floats], precision: s
         if not (off <= CLOSE[precision]).all():
             raise NotAvailable(
                 f"{expected} to {CLOSE[precision]:g}, found a difference of {float(np.max(off)):.3g} of {unit} on"
-                f" flight {number}{reason}. Pass force=True to export it anyway."
+                f" flight {number}{reason}. Pass --force (force=True in Python) to export it anyway."
             )

@@ -19,7 +19,7 @@ def compiled(
     sources: Sequence[str],
     library: str,
     flags: Sequence[str] = (),
-    otherwise: str = "pass force=True",
+    otherwise: str = "pass --force (force=True in Python)",
 ) -> Path:
     """Compiles C99 without warnings.
 

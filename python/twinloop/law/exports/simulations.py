@@ -133,7 +133,7 @@ def needed(module: str, extra: str) -> Any:
     except ImportError as missing:
         raise NotAvailable(
             f"Export: expected the package {module!r} to check it with, found none; pip install 'twinloop[{extra}]', or"
-            " pass force=True."
+            " pass --force (force=True in Python)."
         ) from missing
 
 

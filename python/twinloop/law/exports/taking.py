@@ -33,7 +33,7 @@ def taken_twin(
     if not force and not twin.follows:
         raise NotTrusted(
             "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
-            " follow half of them; learn from more tests, or pass force=True (--force)."
+            " follow half of them; learn from more tests, or pass --force (force=True in Python)."
         )
     law, flights = twin.law, list(twin.flights)
     if law.actuation.stored and law.form == "acceleration" and chosen in STEPPED:

@@ -101,7 +101,7 @@ def built(unit: Unit, folder: Path) -> tuple[Path, str]:
         NotAvailable: no C compiler, a machine that FMI does not know, or a compiler that refuses.
     """
     machine = BINARIES.get((sys.platform, platform.machine()))
-    sources_alone = "pass force=True for an FMU of sources alone"
+    sources_alone = "pass --force (force=True in Python) for an FMU of sources alone"
     if machine is None:
         raise NotAvailable(
             "Export, FMU: expected Linux or macOS to build the binary, found"
