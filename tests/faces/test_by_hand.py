@@ -376,6 +376,28 @@ def test_a_changed_campaign_file_is_refused(folder):
     assert refused.exit_code == 2 and "seed: 0 in the store, 1 now" in refused.stderr
 
 
+@pytest.mark.parametrize("value", ["3.0", "40.0"])  # within its bounds, and outside of them
+def test_changed_gains_of_the_first_test_are_refused(folder, value):
+    run("ask", "rig.db")
+    file = folder / "rig.toml"
+    before = file.read_text(encoding="utf-8")
+    file.write_text(before.replace('"angle.kp" = 2.0', f'"angle.kp" = {value}'), encoding="utf-8")
+    refused = run("ask", "rig.db")
+    assert refused.exit_code == 2 and f"first: angle.kp: 2.0 in the store, {value} now" in refused.stderr
+    file.write_text(before, encoding="utf-8")
+    assert run("ask", "rig.db").exit_code == 0
+
+
+def test_another_duration_is_named_as_the_file_does(folder):
+    run("ask", "rig.db")
+    file = folder / "rig.toml"
+    before = file.read_text(encoding="utf-8")
+    file.write_text(before.replace("duration = 1.0 ", "duration = 1.5 "), encoding="utf-8")
+    assert "found another: duration: 1.0 in the store, 1.5 now;" in run("ask", "rig.db").stderr
+    file.write_text(before.replace("dt = 0.05 ", "dt = 0.1 "), encoding="utf-8")
+    assert "found another: signals: dt: 0.05 in the store, 0.1 now;" in run("ask", "rig.db").stderr
+
+
 def test_what_differs_between_a_store_and_its_file_is_named_where_long_lists_begin_alike(folder):
     run("ask", "rig.db")
     file = folder / "rig.toml"

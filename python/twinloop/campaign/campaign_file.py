@@ -11,6 +11,7 @@ from typing import Any
 from twinloop._ground.texts import to_type
 from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
+from twinloop.campaign.differing import differences
 from twinloop.campaign.presets import PRESETS
 from twinloop.campaign.system_section import SystemSection, said_by, system_section
 from twinloop.controllers import UnboundFamily
@@ -148,8 +149,29 @@ class CampaignFile:
 
         Args:
             others: arguments that no file holds, such as `store` or `threads`.
+
+        Raises:
+            InvalidInput: the store holds another campaign, or its first test has other gains.
         """
-        return Campaign(**self.arguments, **others)
+        campaign = Campaign(**self.arguments, **others)
+        try:
+            self._check_first(campaign)
+        except InvalidInput:
+            campaign.close()
+            raise
+        return campaign
+
+    def _check_first(self, campaign: Campaign) -> None:
+        """Refuses other gains than those of the first test that was made; what a system says of them nobody typed."""
+        made = next(iter(campaign.tests), None)
+        if made is None or made.reason or made.predicted is not None or self.made is not None:
+            return  # the first test may be one that was planned from attached flights
+        differ = differences({"first": made.parameters}, {"first": {**campaign.family.fixed, **self.first}})
+        if differ:
+            raise InvalidInput(
+                f"Campaign file {self.path}: expected the gains that the first test of {campaign.store} was made with,"
+                f" found others: {differ}; write those of the store, or copy the file for another campaign."
+            )
 
     def system(self) -> System:
         """What flies by itself; making it may run code of a user's own.

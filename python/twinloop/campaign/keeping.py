@@ -63,7 +63,11 @@ class Keeping:
             held = found(store, name)
             assert held is not None  # the keeper has entered it
             known = Setup.from_record(held.setup).to_record()
-            _check_same(known, asked, f"Store {store.name}: expected the campaign {name!r} as it was begun")
+            _check_same(
+                _stated(known),
+                _stated(asked),
+                f"Store {store.name}: expected the campaign {name!r} as it was begun",
+            )
             self._keeper.open_session(provenance(threads))
         except BaseException:
             self.close()
@@ -297,6 +301,12 @@ def _check_name(name: object) -> None:
             f"Campaign, name: expected a text of 1 to 200 characters, found {name!r}; name it."
         )
     text("Campaign, name", name)
+
+
+def _stated(setup: Record) -> Record:
+    """A setup with the length of a test as people state it, in s."""
+    others = {key: value for key, value in setup.items() if key != "steps"}
+    return {**others, "duration": round(setup["steps"] * setup["signals"]["dt"], 9)}
 
 
 def _check_same(known: Any, asked: Any, what: str) -> None:
