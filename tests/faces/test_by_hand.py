@@ -159,6 +159,10 @@ def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_s
     assert "Not learnt" not in shown.stdout and "learnt from 1 experiment" in shown.stdout
     flown(look().tests[0])
     assert len(look().tests) == 1  # nothing was asked for
+    # Gains that no test was made of are called by no number.
+    assert "Controller: tuned gains, not asked for yet, " in shown.stdout
+    assert shown.stdout.endswith("To fly the tuned gains: twinloop ask rig.db --last\n")
+    assert json.loads(run("show", "rig.db", "--json").stdout)["result"]["controller"]["test"] is None
     # What was learnt so is what the next question learns.
     other = read_file("rig.toml").campaign(threads=1)
     test = other.test(read_file("rig.toml").first)

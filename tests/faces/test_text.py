@@ -133,6 +133,16 @@ def test_advice_to_stop_is_given_where_a_gain_could_not_be_measured(advice, word
     assert words in render(result_of_default(**advice))
 
 
+def test_gains_that_no_test_was_made_of_have_no_number():
+    result = result_of_default()
+    assert "Controller: test 1, " in render(result)
+    result["controller"]["test"] = None
+    text = render(result)
+    assert (
+        "Controller: tuned gains, not asked for yet, " in text and "CONTROLLER TO FLY: NOT FLOWN YET" in text
+    )
+
+
 def test_a_quality_without_a_unit_is_named_without_one():
     assert quality_words("ise", "") == "integrated squared error"
     assert quality_words("iae", "rad s") == "integrated absolute error (rad s)"

@@ -251,3 +251,14 @@ def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:
         return campaign.best_test, ""
     except NotAvailable as reason:
         return None, str(reason)
+
+
+def number_of(campaign: Campaign, best: Test) -> int | None:
+    """The number of the test with the gains of a controller; None where they were tuned, and no test was made of them.
+
+    Args:
+        campaign: of the controller.
+        best: its `best_test`, which has the number of a test to come where there is none yet.
+    """
+    made = campaign.tests[best.number : best.number + 1]
+    return best.number if made and made[0].genes.tobytes() == best.genes.tobytes() else None

@@ -15,6 +15,7 @@ from twinloop.campaign.assessment import (
     disturbances,
     expected_quality,
     latest_lesson,
+    number_of,
     predicted_quality,
 )
 from twinloop.campaign.cost import Cost
@@ -124,7 +125,7 @@ def _controller(
     predicted, spread = predicted_quality(best, campaign.experiments)
     planned = examination.planned
     found: dict[str, object] = {
-        "test": best.number,
+        "test": number_of(campaign, best),
         "gains": [
             {
                 "name": gain.name,

@@ -108,6 +108,8 @@ def show(store: str, name: str | None, as_json: bool) -> None:
         # Looking took no time that anyone asks for.
         shown = {**result, "run_info": {**result["run_info"], "seconds": None}}
         text += f"\n{render(shown, _learnt(campaign, held))}"
+        if result["controller"] is not None and result["controller"]["test"] is None:
+            text += f"To fly the tuned gains: {to_type('ask', shown_name(store), '--last')}\n"
     _print({"store": facts, "result": result}, text, as_json)
 
 

@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 
 from twinloop import _core
 from twinloop._experiment.envelope import is_bounded
-from twinloop.campaign.assessment import predicted_quality
+from twinloop.campaign.assessment import number_of, predicted_quality
 from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables.table import Table, shown_value
+from twinloop.faces.text.words import controller_name
 from twinloop.planning.leaving import risk_of_what, short_risk
 from twinloop.planning.quality import quality_unit
 
@@ -84,7 +85,7 @@ def _answers(source: Source) -> list[Row]:
         (f"error of whole flights, {words(state.name)} ({state.unit or '1'})", float(rmse[i]))
         for i, state in enumerate(found.signals.states)
     ]
-    rows.append(("controller", "none" if best is None else f"test {best.number}"))
+    rows.append(("controller", "none" if best is None else controller_name(number_of(campaign, best))))
     if best is not None:
         predicted, spread = predicted_quality(best, found.experiments)
         rows += [

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop.faces.text.table import cell
-from twinloop.faces.text.words import quality_words, with_unit
+from twinloop.faces.text.words import controller_name, quality_words, with_unit
 
 
 def verdict(result: Mapping[str, Any]) -> str:
@@ -47,7 +47,7 @@ def _verdict_on_controller(result: Mapping[str, Any]) -> str:
     words = quality_words(measure["kind"], measure["unit"])
     found = f"measured {cell(best['measured'])}" if best["measured"] is not None else "not measured yet"
     before = "" if first is None else f"; the first one: measured {cell(first['measured'])}"
-    return f"test {best['test']}, {words} predicted {cell(best['predicted'])}, {found}{before}."
+    return f"{controller_name(best['test'])}, {words} predicted {cell(best['predicted'])}, {found}{before}."
 
 
 def _next(result: Mapping[str, Any]) -> str:

@@ -80,6 +80,15 @@ def flown_words(found: Examination) -> str:
     return "flown only with an excitation" if found.best_flights else "not flown yet"
 
 
+def controller_name(test: int | None) -> str:
+    """What the controller to fly is called.
+
+    Args:
+        test: with its gains; None: there is none yet.
+    """
+    return "tuned gains, not asked for yet" if test is None else f"test {test}"
+
+
 def counted(measure: Mapping[str, Any]) -> str:
     """What counts in a quality, with weights and units, for a person.
 
