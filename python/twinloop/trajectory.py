@@ -170,6 +170,17 @@ def equal_runs(one: Trajectory, other: Trajectory) -> bool:
     return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)
 
 
+def begins_as(one: Trajectory, other: Trajectory) -> bool:
+    """Whether a run has the states and commands with which another one begins, to the last digit.
+
+    Args:
+        one: run.
+        other: a longer run.
+    """
+    pairs = (one.states, other.states), (one.commands, other.commands)
+    return one.steps < other.steps and all(np.array_equal(a, b[: len(a)]) for a, b in pairs)
+
+
 def continued(trajectory: Trajectory, signals: Signals, start: Floats) -> Trajectory:
     """The same run with periodic states that go on from row to row by the short way, however they were wrapped.
 

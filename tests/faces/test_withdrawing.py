@@ -73,6 +73,29 @@ def test_an_attached_flight_is_withdrawn_by_its_log_or_its_place(flights, which)
     assert [run.number for run in look().experiments] == [0]
 
 
+@pytest.mark.parametrize(
+    ("which", "taken", "left"),
+    [
+        ("0", "20 steps, completed", "9 steps, aborted: wind"),
+        ("cut.csv", "9 steps, aborted: wind", "20 steps, completed"),
+    ],
+)
+def test_a_flight_that_is_the_beginning_of_another_record_is_noticed_and_withdrawn(
+    flights, which, taken, left
+):
+    withdrawn("0")
+    rows = (flights / "flight0.csv").read_text("utf-8").splitlines(keepends=True)
+    (flights / "cut.csv").write_text("".join(rows[:11]), encoding="utf-8")
+    cut = run("tell", "rig.db", "0", "--aborted", "cut.csv", "--reason", "wind")
+    assert cut.exit_code == 0 and "count twice" not in cut.stderr
+    whole = run("tell", "rig.db", "0", "flight0.csv")
+    assert "A flight of test 0 of 9 steps has the same first 9 steps" in whole.stderr
+    assert "twinloop withdraw rig.db LOG --reason WHY" in whole.stderr
+    said = withdrawn(which).stdout
+    assert f"Saved: the flight of test 0 ({taken}) withdrawn; 2 experiments" in said
+    assert f"Still recorded of test 0: {left}." in said and "Its right log" not in said
+
+
 def test_show_says_what_was_withdrawn_when_and_why(flights):
     withdrawn("attached-1")
     shown = run("show", "rig.db").stdout

@@ -22,7 +22,7 @@ from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
 from twinloop.faces.telling import attach as attach_flight
-from twinloop.faces.telling import counted, numbered, tell_failed
+from twinloop.faces.telling import counted, numbered, tell_failed, told_twice
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import Log, write_columns
 from twinloop.planning.quality import quality_unit
@@ -223,7 +223,8 @@ def abandon(store: str, test: int, as_json: bool) -> None:
 
 def _against(campaign: Campaign, flight: Experiment, asked: Test | None, read: Log) -> list[str]:
     """What speaks against a flight that was told."""
-    return [remark.sentence for remark in against(flight, asked, campaign.signals, read.lines)]
+    found = against(flight, asked, campaign.signals, read.lines)
+    return [*(remark.sentence for remark in found), *told_twice(campaign, flight, asked)]
 
 
 def _say(remarks: Sequence[str]) -> None:

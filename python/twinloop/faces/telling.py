@@ -8,10 +8,12 @@ import numpy as np
 
 from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
+from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput
 from twinloop.logs import Log, read_log
+from twinloop.store import shown_name
 from twinloop.test import Test
-from twinloop.trajectory import Trajectory, check_period, equal_runs
+from twinloop.trajectory import Trajectory, begins_as, check_period, equal_runs
 
 
 def numbered(campaign: Campaign, number: int) -> Test:
@@ -159,6 +161,30 @@ def tell_failed(
     with found.errors():
         campaign.tell_failed(test, reason, run)
     return test, found
+
+
+def told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> list[str]:
+    """That a flight is the beginning of another record, or the other way round: a sentence for each of them.
+
+    Args:
+        campaign: that it was recorded in.
+        flight: one of its experiments.
+        test: of the flight; None: it was attached.
+    """
+    run, said = flight.trajectory, []
+    for other in campaign.experiments:
+        if other is flight or (test is not None and _again(other.test, test)):
+            continue
+        short, long = sorted((run, other.trajectory), key=lambda each: each.steps)
+        if begins_as(short, long):
+            of = "an attached flight" if other.number is None else f"a flight of test {other.number}"
+            withdraw = to_type("withdraw", shown_name(campaign.store or "STORE"), "LOG", "--reason", "WHY")
+            said.append(
+                f"{of.capitalize()} of {other.trajectory.steps} steps has the same first {short.steps} steps to the"
+                " last digit, so that they count twice: withdraw the shorter record by its log:"
+                f" {withdraw}"
+            )
+    return said
 
 
 def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | None) -> None:

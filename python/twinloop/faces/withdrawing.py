@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -38,17 +38,22 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
     their order. The record stays, with the reason. The test is asked again: tell the right log.
     """
     with closing(Campaign.load(store, name)) as campaign:
+        before = campaign.experiments
         campaign.withdraw(chosen(campaign, which), reason)
         test = campaign.withdrawals[-1].test
+        others = [run for run in campaign.experiments if test is not None and run.number == test]
         facts = {
             "test": test, "reason": reason, "abandoned": given_up(campaign), "experiments": len(campaign.experiments),
         }  # fmt: skip
         shown = shown_name(store)
+        which_one = _which(campaign, before) if others else ""
         lines = [
-            f"Saved: {named(test)} withdrawn; {counted(campaign)} in {shown}.",
+            f"Saved: {named(test)}{which_one} withdrawn; {counted(campaign)} in {shown}.",
             *given_up_words(campaign),
         ]
-        if test is not None:
+        if others:
+            lines.append(f"Still recorded of test {test}: {', '.join(map(_described, others))}.")
+        elif test is not None:
             lines.append(f"Its right log, if there is one: {to_type('tell', shown, test, 'FLIGHT.csv')}")
         answer(facts, "\n".join(lines), as_json)
 
@@ -77,6 +82,26 @@ def chosen(campaign: Campaign, which: str) -> int | Experiment:
         f"twinloop withdraw: expected the number of a test, a log as it was recorded, or {_names(attached)},"
         f" found {which}; nothing was changed."
     )
+
+
+def _which(campaign: Campaign, before: Sequence[Experiment]) -> str:
+    """What the run was that was withdrawn last, where it is not the only one of its test.
+
+    Args:
+        campaign: after it was withdrawn.
+        before: the experiments with it.
+    """
+    *earlier, last = campaign.withdrawals
+    if last.run is None:
+        return ""
+    place = last.run - sum(each.run is not None and each.run < last.run for each in earlier)
+    return f" ({_described(before[place])})"
+
+
+def _described(run: Experiment) -> str:
+    """A run in a few words."""
+    found = run.trajectory
+    return f"{found.steps} steps, {found.ended}{f': {found.reason}' if found.reason else ''}"
 
 
 def named(test: int | None) -> str:
