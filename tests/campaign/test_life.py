@@ -11,6 +11,7 @@ from conftest import PENDULUM_GAINS, pendulum_step
 from lives import FULL_LIFE, PLANT, SIGNALS, begun, by_hand, cut, lived, made, outcome
 from lives import new as begin
 from oracles import same_bits
+from twinloop.campaign.examination import log_check
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.text import render
 
@@ -329,3 +330,13 @@ def test_a_campaign_with_attached_failed_and_abandoned_flights_is_rebuilt_from_i
     assert [failure.reason for failure in moved.failures] == ["the motor cut out"]
     asked = [campaign.ask(last=True) for campaign in (plain, moved)]
     assert same_bits(asked[0].genes, asked[1].genes)
+
+
+def test_telling_a_flight_compares_no_columns_whose_notes_nobody_would_see(monkeypatch):
+    compared = []
+    monkeypatch.setattr(log_check, "_of_columns", lambda *columns: compared.append(columns) or ())
+    campaign, record = made(), by_hand(55)
+    campaign.attach(record)
+    assert not compared
+    log_check.check_log(record.t, record.states, record.commands, SIGNALS)
+    assert len(compared) == 1

@@ -113,6 +113,18 @@ def check_log(
         signals: declared signals.
         lines: of each row in its file, for the sentences; None: they call rows by their index.
     """
+    return _checked(t, states, commands, signals, lines, compared=True)
+
+
+def _checked(
+    t: Floats,
+    states: Floats,
+    commands: Floats,
+    signals: Signals,
+    lines: Sequence[int] | None,
+    compared: bool,
+) -> LogCheck:
+    """A log as it was checked; with columns compared with each other, which takes most of the time and gives notes."""
     steps = np.diff(t)
     known = steps[np.isfinite(steps)]
     lost = known > LOST * signals.dt
@@ -127,7 +139,7 @@ def check_log(
         and np.isfinite(commands).all()
         and len(commands) > 1
     ):
-        remarks += _of_run(t, states, commands, signals, remarks, lines)
+        remarks += _of_run(t, states, commands, signals, remarks, lines, compared)
     return LogCheck(
         rows=len(t),
         seconds=float(t[-1] - t[0]) if len(t) else 0.0,
@@ -155,7 +167,7 @@ def against(
         Serious remarks, and a note where an excitation was not flown; none where nothing does.
     """
     run = flight.trajectory
-    found = check_log(run.t, run.states, run.commands, signals, lines).remarks
+    found = _checked(run.t, run.states, run.commands, signals, lines, compared=False).remarks
     others = other_commands([flight])
     pair = exchanged(flight) if others else None
     names = [signals.commands[i].name for i in pair or ()]
@@ -333,6 +345,7 @@ def _of_run(
     signals: Signals,
     before: Sequence[Remark],
     lines: Sequence[int] | None,
+    compared: bool,
 ) -> Sequence[Remark]:
     """What is said of a run when it is learnt, and what would refuse it that was not said yet."""
     known = any(remark.serious for remark in before)
@@ -345,7 +358,7 @@ def _of_run(
         return [remark for remark in suspicious([run], signals) if remark.serious]
     runs, found = without_turns([run], signals, lambda _, row: f"at {row_name(row, lines)}, {run.t[row]:g} s")
     found += [*against_derivatives(runs, signals), *suspicious(runs, signals)]
-    if not known and not any(remark.serious for remark in found):
+    if compared and not known and not any(remark.serious for remark in found):
         found += _of_columns(run, signals, {remark.code for remark in found})
     if not known:
         try:
