@@ -24,7 +24,7 @@ from twinloop_exam.zoo import honesty
 from twinloop_exam.zoo.held_out import COUNT, HeldOut, held_out, repeats
 from twinloop_exam.zoo.honesty import Flight
 from twinloop_exam.zoo.optima import best_quality, under_noise
-from twinloop_exam.zoo.plant import Plant
+from twinloop_exam.zoo.plant import Plant, true_states
 from twinloop_exam.zoo.plants import plant as plant_named
 
 Measured = dict[str, Any]
@@ -123,11 +123,14 @@ def _fly(job: Job, plant: Plant, found: Measured) -> None:
         progress=None,
     )
     flown: list[Flight] = []
+    repeated: list[Flight] = []
     test = campaign.test(asked.first)
     for number in range(job.flights):
         row, flight = _flown(plant, system, campaign, test)
         if flight is not None:
             flown.append((test, flight))
+            if repeats(plant, test, true_states(plant.truth.run(test))):
+                repeated.append((test, flight))
         clock = time.process_time()
         last = number == job.flights - 1
         # What is learnt of the last flight, and the test that would come next, cost what any other `ask` does.
@@ -135,7 +138,7 @@ def _fly(job: Job, plant: Plant, found: Measured) -> None:
         twin = campaign.twin
         if not last:
             row["ask_seconds"] = time.process_time() - clock
-        row |= _known(plant, campaign, judge, flown)
+        row |= _known(plant, campaign, judge, flown, repeated)
         found["flights"].append(row)
         if following is not None:
             test = following
@@ -171,7 +174,9 @@ def _flown(plant: Plant, system: Any, campaign: Campaign, test: Test) -> tuple[M
     return _plain(row), flight
 
 
-def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]) -> Measured:
+def _known(
+    plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight], repeated: list[Flight]
+) -> Measured:
     """What is measured of the twin and the controller to fly."""
     twin = campaign.twin
     lesson = [record for record in campaign.history if isinstance(record, Lesson)][-1]
@@ -196,7 +201,7 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
             ],
             "empty": honesty.empty_equations(twin, flown),
             "missed": honesty.misses(plant, twin, flown),
-            "missed_repeated": honesty.misses(plant, twin, [run for run in flown if repeats(plant, run[0])]),
+            "missed_repeated": honesty.misses(plant, twin, repeated),
             "serious": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if one.serious}),
             "noted": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if not one.serious}),
             "follows": lesson.follows,
