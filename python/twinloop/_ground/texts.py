@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 from twinloop.errors import InvalidInput
 
@@ -58,6 +59,16 @@ def one_line(text: str) -> str:
         text: from anybody, such as a unit.
     """
     return " ".join("".join(each if each.isprintable() else " " for each in text).split())
+
+
+def enumerated(names: Sequence[str]) -> str:
+    """Names in a sentence, such as "roll, pitch and yaw".
+
+    Args:
+        names: at least one.
+    """
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def in_unit(text: str, unit: str) -> str:

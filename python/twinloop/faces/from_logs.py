@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from twinloop._experiment.limits import Limits
+from twinloop._ground.texts import to_type
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.campaign.presets import options_of
@@ -101,7 +102,7 @@ def _flight(file: Path, signals: Signals, config: Path) -> Trajectory:
             check_recorded(flight, Limits(signals), None)
         return flight
     except InvalidInput as reason:
-        raise InvalidInput(f"{reason} To look into it: twinloop check {file} {config}") from reason
+        raise InvalidInput(f"{reason} To look into it: {to_type('check', file, config)}") from reason
 
 
 def _facts(twin: Twin, files: Sequence[Path], runs: Sequence[Trajectory], learnt: int) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from twinloop import _core
 from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
+from twinloop._ground.texts import in_unit
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard.band import BandWatch
@@ -234,7 +235,7 @@ class Guard:
             elif not np.isfinite(reading[i]):
                 what = "is not a finite number"
             else:
-                what = f"cannot be: {reading[i]:.4g} {states[i].unit}".rstrip()
+                what = f"cannot be: {in_unit(f'{reading[i]:.4g}', states[i].unit)}"
             return self._trip(f"the reading of {states[i].name} {what}")
         took = self._took()
         if took is not None and took < 0.0:
@@ -313,8 +314,8 @@ def _safe(fallback: Controller | ArrayLike, signals: Signals) -> Controller | Fl
         low, high = command.bounds
         if not low <= value <= high:
             raise InvalidInput(
-                f"Guard, fallback: expected {command.name} within its bounds, {low:g} to {high:g} {command.unit}, found"
-                f" {value:g}; hold a command that may be sent."
+                f"Guard, fallback: expected {command.name} within its bounds,"
+                f" {in_unit(f'{low:g} to {high:g}', command.unit)}, found {value:g}; hold a command that may be sent."
             )
     return held
 

@@ -41,7 +41,7 @@ class Window:
     stop: float | None = None
 
 
-class _Cut(io.BufferedReader):
+class _Watched(io.BufferedReader):
     """A file that knows whether it ended within what was to be read, as it does where power was lost."""
 
     cut = False
@@ -91,11 +91,11 @@ def read_ulog(
     times = np.asarray(start + signals.dt * np.arange(count + 1), dtype=np.float64)
     states = [_interpolated(found[state.name], state, times) for state in signals.states]
     commands = [_held(found[name], times[:-1]) for name in signals.command_names]
-    remarks = [_cut(found.values())] if cut and window.stop is None else []
+    remarks = [_ends_early(found.values())] if cut and window.stop is None else []
     return times - start, np.stack(states, axis=1), np.stack(commands, axis=1), tuple(remarks)
 
 
-def _cut(found: Iterable[_Samples]) -> Remark:
+def _ends_early(found: Iterable[_Samples]) -> Remark:
     until = max(float(samples.times[-1]) for samples in found)
     return note(
         "cut",
@@ -157,7 +157,7 @@ def _parsed(path: Path, called: str, topics: list[str]) -> tuple[Any, bool]:
 
     try:
         # pyulog prints its warnings, and does not close what it opened where it fails.
-        with _Cut(io.FileIO(path)) as file, contextlib.redirect_stdout(io.StringIO()):
+        with _Watched(io.FileIO(path)) as file, contextlib.redirect_stdout(io.StringIO()):
             log = Bounded(file, topics)
     except OSError:
         raise

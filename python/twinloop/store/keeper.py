@@ -209,9 +209,7 @@ class Keeper:
         from twinloop.store.schema import sessions
 
         with self._writing() as connection:
-            if any(
-                _count(connection, table, self._id) != self.rows[name] for name, table in _entries().items()
-            ):
+            if self._counted(connection) != self.rows:
                 raise taken(self._what, "another one")
             number = _count(connection, sessions, self._id)
             row = {

@@ -81,7 +81,7 @@ def _beside_a_constant(
     A constant derivative moves its state along a line: only what the state does beside one contradicts it.
     """
     j, i = of
-    on = [run.continued(signals).states for run in runs]
+    on = [run.states for run in runs]
     constant = [all(np.ptp(states[:, place]) == 0.0 for states in on) for place in of]
     if not any(constant):
         return None

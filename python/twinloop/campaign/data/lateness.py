@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import enumerated
 from twinloop.campaign.data.integrated import cuts, without_line
 from twinloop.campaign.data.turning import turning
 from twinloop.remarks import Remark, note
@@ -68,9 +69,9 @@ def late(states: Floats, signals: Signals) -> Iterator[Remark]:
         )
         yield note(
             "late",
-            f"{_listed(moved.states)} {'are' if several else 'is'} read about"
+            f"{enumerated(moved.states)} {'are' if several else 'is'} read about"
             f" {f'{ms:.0f}' if ms > 10.0 else f'{ms:.2g}'} ms {'later' if shift > 0.0 else 'earlier'} than"
-            f" {_listed(moved.rates)}, which move{' them' if several else 's it'}. {cure}",
+            f" {enumerated(moved.rates)}, which move{' them' if several else 's it'}. {cure}",
         )
 
 
@@ -85,11 +86,6 @@ def _moved(states: Floats, signals: Signals) -> Iterator[_Moved]:
     body = signals.kinematics
     if body is not None:
         yield _Moved(body.angles, body.rates, columns(body.angles), columns(body.rates), turning)
-
-
-def _listed(names: Sequence[str]) -> str:
-    *others, last = names
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 def lateness(

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import enumerated
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
@@ -56,8 +57,7 @@ def alike(states: Floats, commands: Floats, signals: Signals) -> Iterator[Remark
 
 
 def _names(signals: Signals, commands: Sequence[int]) -> str:
-    *names, last = [signals.command_names[j] for j in commands]
-    return f"{', '.join(names)} and {last}" if names else last
+    return enumerated([signals.command_names[j] for j in commands])
 
 
 def _standard(columns: Floats) -> Floats:

@@ -217,7 +217,7 @@ class _Screen:
         inputs = stages(bare.runs, context.signals, bare.actuation)
         problem = Problem(context, bare, inputs)
         usable = problem.usable(terms)
-        for found in bare.sums if usable else ():
+        for found in bare.sums:
             problem.feedthrough(found.chain, usable)
         unit = context.unit.part(hypothesis.start + STORED)
         return _Screen(context, bare, terms, inputs, problem, unit, itertools.count(1))
