@@ -9,7 +9,15 @@ python=$1 wheel=$2
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 
-"$python" -m venv "$place/venv"
+# In two steps: `python -m venv` alone does not say why pip could not be put there. Tried again, for a busy machine may
+# refuse a process or a file only once.
+"$python" -m venv --without-pip "$place/venv"
+with_pip() { "$place/venv/bin/python" -m ensurepip --default-pip >"$place/ensurepip" 2>&1; }
+with_pip || with_pip || {
+    cat "$place/ensurepip"
+    df -h "$place"
+    exit 1
+} >&2
 begun=$(date +%s)
 "$place/venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary :all: "$wheel"
 # No compiler can be found from here.
