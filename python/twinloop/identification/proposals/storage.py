@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -66,8 +67,12 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("hidden")
     # Behind a short memory of noisy readings their noise would explain itself.
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
-    for variant in (bare, *_at_once(context, bare)):
-        for found in filled_by_motion(context, variant):
+    screens = [Screen.of(context, variant) for variant in (bare, *_at_once(context, bare))]
+    for screen in screens:
+        for found in filled_by_motion(screen):
+            # What is stored in place of a lag describes more than the lag alone, or all that is fitted is in vain.
+            if screen is not screens[0] and not found.evidence > screens[0].plain.evidence:
+                continue
             told = fitted(context, from_both_sides(context, found, found.sums))
             if shows(told.actuation.hidden, context.signals.dt):
                 yield told
@@ -87,18 +92,17 @@ def shows(hidden: Sequence[HiddenState], period: float) -> bool:
     return all(one.time >= max(period, SWINGING * one.turns) for one in hidden if one.states)
 
 
-def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """The hypothesis, not fitted, with the best storage of each kind; none that does not pay at all.
+def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
+    """The hypothesis of a screen, not fitted, with the best storage of each kind; none that does not pay at all.
 
     Kinds are what one state fills, empty or settled at the start, and pairs of each time that is tried. A pair
     describes what is linear whatever its time, which predictions alone tell.
 
     Args:
-        context: of the identification.
-        hypothesis: with sums to begin with, and without such states.
+        screen: of a hypothesis with sums to begin with, and without such states.
     """
-    screen = _Screen.of(context, hypothesis)
-    longest = context.signals.dt * max(len(run.commands) for run in hypothesis.runs)
+    context = screen.context
+    longest = context.signals.dt * max(len(run.commands) for run in screen.hypothesis.runs)
     times = [share * longest for share in TIMES]
     singles = {
         begins: [
@@ -108,9 +112,9 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
         for begins in (False, True)
     }
     best = [max(pair, key=by_evidence) for pair in zip(*singles.values(), strict=True)]
-    near, without = sorted(best, key=lambda one: one.evidence.length)[:NEAR], screen(())
+    near, without = sorted(best, key=lambda one: one.evidence.length)[:NEAR], screen.without
     others = [one.actuation.hidden[0].states[0] for one in near]
-    kinds: list[tuple[_Screen, list[Hypothesis], Sequence[float]]]
+    kinds: list[tuple[Screen, list[Hypothesis], Sequence[float]]]
     kinds = [(screen, found, FINER) for found in singles.values()]
     for time in times:
         pairs = [screen(pair) for one in near for pair in _pairs(context, one, others, time)]
@@ -131,10 +135,9 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
         if found.evidence > without.evidence
     ]
     # Which one shows on the terms that there are; whether there is one, when all may change.
-    bare = _with_all_terms(context, screen, without) if showing else without
     for of_kind, found, factors in showing:
-        grown = _with_all_terms(context, of_kind, _timed(of_kind, found, factors))
-        if grown.evidence > bare.evidence:
+        plain, grown = screen.plain, of_kind.with_all_terms(_timed(of_kind, found, factors))
+        if grown.evidence > plain.evidence:
             yield grown
 
 
@@ -145,7 +148,7 @@ def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
 
 
-def _timed(screen: _Screen, best: Hypothesis, factors: Sequence[float]) -> Hypothesis:
+def _timed(screen: Screen, best: Hypothesis, factors: Sequence[float]) -> Hypothesis:
     """The hypothesis with hidden states of the time that is best near theirs."""
     for factor in factors:
         for _ in range(STEPS):
@@ -163,20 +166,8 @@ def _timed(screen: _Screen, best: Hypothesis, factors: Sequence[float]) -> Hypot
     return best
 
 
-def _with_all_terms(context: Context, screen: _Screen, found: Hypothesis) -> Hypothesis:
-    """The hypothesis with sums of all terms of the first rung, and of those of its hidden states."""
-    candidates = with_hidden(context, found.candidates, len(found.actuation.hidden))
-    starts = max(1, context.options.starts // 2)
-    unit = screen.unit.part(next(screen.numbers))
-    walks = context.walks(unit, context.options.moves, starts, "hidden_subsets")
-    grown = replace(found, candidates=candidates)
-    driven = [one.chain for one in found.sums]
-    sums = search(Problem(context, grown), driven, candidates.ladder[0], found.sums, walks)
-    return replace(grown, sums=tuple(sums))
-
-
 @dataclass(frozen=True, eq=False)
-class _Screen:
+class Screen:
     """Tries hidden states by short searches among few terms: those that there are, and each hidden state alone.
 
     The noise stays what it is without them, so which one explains most of what is left is told by χ² alone.
@@ -200,7 +191,7 @@ class _Screen:
     numbers: Iterator[int]
 
     @staticmethod
-    def of(context: Context, hypothesis: Hypothesis) -> _Screen:
+    def of(context: Context, hypothesis: Hypothesis) -> Screen:
         """What begins with the sums of a hypothesis, without terms of a hidden state that commands fill."""
         candidates = hypothesis.candidates.growing()
         pool = candidates.pool
@@ -220,11 +211,21 @@ class _Screen:
         for found in bare.sums:
             problem.feedthrough(found.chain, usable)
         unit = context.unit.part(hypothesis.start + STORED)
-        return _Screen(context, bare, terms, inputs, problem, unit, itertools.count(1))
+        return Screen(context, bare, terms, inputs, problem, unit, itertools.count(1))
 
-    def beside(self) -> _Screen:
+    def beside(self) -> Screen:
         """The same with a unit of work of its own."""
         return replace(self, unit=self.unit.part(0), numbers=itertools.count(1))
+
+    @cached_property
+    def without(self) -> Hypothesis:
+        """The hypothesis without hidden states, with the best sums of few terms."""
+        return self(())
+
+    @cached_property
+    def plain(self) -> Hypothesis:
+        """The same with sums of all terms."""
+        return self.with_all_terms(self.without)
 
     def __call__(self, sources: Sources) -> Hypothesis:
         """The hypothesis behind some hidden states, with the best sums of few terms."""
@@ -240,6 +241,18 @@ class _Screen:
         problem = Problem(context, tried, inputs, self.problem)
         sums = search(problem, driven, terms, list(bare.sums), walks, fixed_noise=True)
         return replace(tried, sums=tuple(sums))
+
+    def with_all_terms(self, found: Hypothesis) -> Hypothesis:
+        """A tried hypothesis with sums of all terms of the first rung, and of those of its hidden states."""
+        context = self.context
+        candidates = with_hidden(context, found.candidates, len(found.actuation.hidden))
+        starts = max(1, context.options.starts // 2)
+        unit = self.unit.part(next(self.numbers))
+        walks = context.walks(unit, context.options.moves, starts, "hidden_subsets")
+        grown = replace(found, candidates=candidates)
+        driven = [one.chain for one in found.sums]
+        sums = search(Problem(context, grown), driven, candidates.ladder[0], found.sums, walks)
+        return replace(grown, sums=tuple(sums))
 
 
 def _single(place: int, settled: bool, times: Sequence[float]) -> Iterator[Sources]:

@@ -11,8 +11,9 @@ Spong, Robot modeling and control, for equations of motion; Gauss's elimination 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -148,10 +149,16 @@ class _Joints:
         if found is not None and shorter(total(found), total(known)):
             return found
         # Every joint may have come upon the equation of the same one, for it tells all accelerations in it.
-        others = (self._others_without_commands_of(i, posed, parts, walks) for i in range(len(parts)))
-        tried = (found, *(self._solved_together(posed, each) for each in others))
-        several = [sums for sums in tried if sums is not None]
-        return shortest(several, total) if several else None
+        briefly = [
+            (keeper, sums)
+            for keeper in self._overlapping(parts)
+            if (sums := self._around(keeper, posed, parts, walks, 0)) is not None
+        ]
+        if not briefly:
+            return found
+        keeper, brief = shortest(briefly, lambda tried: total(tried[1]))
+        tried = (found, brief, self._around(keeper, posed, parts, walks, OWN))
+        return shortest([sums for sums in tried if sums is not None], total)
 
     def _posed(self, known: Sequence[Sum], walks: Walks) -> list[_Posed] | None:
         """What equations are chosen from; None where a short walk comes upon no shared mass that may pay."""
@@ -180,27 +187,50 @@ class _Joints:
         costs = [float(own.costs[part.columns].sum()) for own, part in zip(posed, parts, strict=True)]
         return self._sums(equations, costs)
 
-    def _others_without_commands_of(
-        self, keeper: int, posed: Sequence[_Posed], parts: Sequence[Chosen], walks: Walks
-    ) -> list[Chosen]:
-        """The equation of one joint with those of the others chosen again, without the commands that move that one."""
-        every = self.terms.forces
-        moving = self._commands([every[j] for j in parts[keeper].columns if j < len(every)])
+    def _overlapping(self, parts: Sequence[Chosen]) -> list[int]:
+        """Joints whose equation has commands that another one has, too."""
+        moving = [self._moving(part) for part in parts]
+        return [i for i, own in enumerate(moving) if any(own & each for each in (*moving[:i], *moving[i + 1 :]))]
+
+    def _around(
+        self, keeper: int, posed: Sequence[_Posed], parts: Sequence[Chosen], walks: Walks, own: int
+    ) -> list[Sum] | None:
+        """The equation of one joint with those of the others chosen again, without the commands that move that one.
+
+        Args:
+            keeper: whose equation stays.
+            posed: what is chosen from.
+            parts: what was chosen before.
+            walks: of the turn.
+            own: terms at most that the mass of a joint itself depends on.
+        """
+        every, moving = self.terms.forces, self._moving(parts[keeper])
         out = [bool(self._commands([force]) & moving) for force in every]
         limited = []
-        for joint, own in enumerate(posed):
-            costs = own.costs.copy()
-            if joint != keeper:
-                costs[: len(every)][out] = np.inf
-            limited.append(replace(own, costs=costs))
-        chosen = self._chosen(limited, walks, keeper + 1)
-        return [parts[joint] if joint == keeper else part for joint, part in enumerate(chosen)]
+        for each in posed:
+            costs = each.costs.copy()
+            costs[: len(every)][out] = np.inf
+            limited.append(replace(each, costs=costs))
+        limited[keeper] = posed[keeper]
+        chosen = self._chosen(limited, walks, keeper + 1, own, {keeper: parts[keeper]})
+        return self._solved_together(posed, chosen)
+
+    def _moving(self, part: Chosen) -> set[int]:
+        """The commands among the forces of an equation."""
+        return self._commands([self.terms.forces[j] for j in part.columns if j < len(self.terms.forces)])
 
     def _commands(self, nodes: Sequence[int]) -> set[int]:
         """The commands that some nodes are computed from."""
         return set(range(self.states, self.pool.inputs)) & set(self.pool.needed(nodes))
 
-    def _chosen(self, posed: Sequence[_Posed], walks: Walks, number: int) -> list[Chosen]:
+    def _chosen(
+        self,
+        posed: Sequence[_Posed],
+        walks: Walks,
+        number: int,
+        own: int = OWN,
+        kept: Mapping[int, Chosen] = MappingProxyType({}),
+    ) -> list[Chosen]:
         """The columns of each joint's equation and their weights, by what the equation leaves of its acceleration.
 
         What its own mass depends on enters one term at a time: several of them together are next to nothing on flights
@@ -210,34 +240,49 @@ class _Joints:
             posed: what is chosen from.
             walks: of the turn.
             number: of the choice in the turn, by which its walks are told from those of others.
+            own: terms at most that the mass of a joint itself depends on.
+            kept: equations that stay, by joint.
         """
         several = replace(walks, starts=STARTS)
         own_mass: list[tuple[int, ...]] = [()] * len(posed)
-        best, lengths = [Chosen([], [])] * len(posed), [np.inf] * len(posed)
+        lengths, best = [np.inf] * len(posed), [kept.get(i, Chosen([], [])) for i in range(len(posed))]
         part = NOISE_ROUNDS + 2 + number * (OWN + 1) * len(self.terms.masses)
         offered: list[int | None] = [None]
-        for round_ in range(OWN + 1):
+        joints = [i for i in range(len(posed)) if i not in kept]
+        for round_ in range(own + 1):
             before = list(own_mass)
             for term in offered:
                 allowed = [terms if term is None else (*terms, term) for terms in before]
                 limited = [
-                    self.terms.with_own_mass_of(allowed[i], i, own.costs, own.masses)
-                    for i, own in enumerate(posed)
+                    self.terms.with_own_mass_of(allowed[i], i, posed[i].costs, posed[i].masses) for i in joints
                 ]
                 tried = several if term is None else several.with_moves(several.moves // SHORTER)
-                walked = tried.part(part).among([own.gram for own in posed], limited, self.problem.workers)
+                grams = [posed[i].gram for i in joints]
+                walked = tried.part(part).among(grams, limited, self.problem.workers)
                 part += 1
-                for i, (own, subsets) in enumerate(zip(posed, walked, strict=True)):
-                    found = thinned(own.gram, list(subsets[0][0]), own.costs)
-                    length = self.terms.residual_length(i, own.chain, own.columns, own.masses, found)
-                    length += float(own.costs[found.columns].sum())
+                for i, subsets in zip(joints, walked, strict=True):
+                    at = posed[i]
+                    found = thinned(at.gram, list(subsets[0][0]), at.costs)
+                    length = self.terms.residual_length(i, at.chain, at.columns, at.masses, found)
+                    length += float(at.costs[found.columns].sum())
                     if shorter(length, lengths[i]):
                         best[i], lengths[i], own_mass[i] = found, length, allowed[i]
-            if round_ and own_mass == before:
-                break
             if round_ == 0:
                 offered = [*self._terms_of_shared_poses(posed, best)]
+                joints = [i for i in self._sharing(posed, best) if i not in kept]
+            else:
+                joints = [i for i in joints if own_mass[i] != before[i]]
+            if not joints:
+                break
         return best
+
+    def _sharing(self, posed: Sequence[_Posed], parts: Sequence[Chosen]) -> list[int]:
+        """Joints that share a mass with another one: what is moved alone has a mass that no pose changes."""
+        of_others = [
+            {mass.joint for mass in self.terms.chosen_masses(part.columns, own.masses)} - {joint}
+            for joint, (own, part) in enumerate(zip(posed, parts, strict=True))
+        ]
+        return [i for i, others in enumerate(of_others) if others or any(i in each for each in of_others)]
 
     def _terms_of_shared_poses(self, posed: Sequence[_Posed], parts: Sequence[Chosen]) -> list[int]:
         """Terms of those angles on which the masses between joints depend; their own masses depend on no others."""
