@@ -15,6 +15,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.terms.attitude import tilts
 from twinloop.identification.terms.directions import Direction
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.levels import Levels
@@ -116,6 +117,10 @@ class Context:
         if self.earlier is not None:
             return self.earlier.pool.copy()
         return Pool(self.signals.n_x + self.signals.n_u, len(self.options.operators))
+
+    def tilts(self, pool: Pool) -> list[int]:
+        """How the pose of a rigid body turns what drives it, in a pool where its library has entered that."""
+        return tilts(pool, self.signals) if "attitude" in self.options.libraries else []
 
     def under(self, form: str) -> Context:
         """The same once a form is believed: what was known under another one is no help."""

@@ -70,7 +70,7 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
         driven = (with_moved(chain, runs, signals.dt) for chain in driven)
     candidates = Candidates.of(pool, signals, options, form, seen)
     if options.libraries and options.mixer:
-        candidates = candidates.with_directions(context.axes, exact=True)
+        candidates = candidates.with_directions(context.axes, (), context.tilts(candidates.pool), exact=True)
     return Hypothesis(
         form=form,
         offsets=np.zeros(signals.n_x),

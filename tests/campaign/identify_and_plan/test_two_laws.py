@@ -55,6 +55,7 @@ class Known:
     members: list
     remarks: list
     actuation: Actuation
+    terms: int = 1
 
 
 AT_ONCE = Actuator()
@@ -118,6 +119,17 @@ def test_what_was_foretold_decides_before_what_is_missed_of_flights_that_are_kno
     assert better_of(nonlinear, rough, None).identified.model == "n"
     assert better_of(nonlinear, rough, "linear").identified.model == "r"
     assert better_of(nonlinear, rough, "nonlinear").identified.model == "n"
+
+
+@pytest.mark.parametrize(("terms", "believed"), [(3, "r"), (4, "r"), (5, "n")])
+def test_a_linear_law_that_misses_less_with_more_terms_is_not_believed_for_that(terms, believed):
+    nonlinear, rough = answer([[0.3, 0.4]], name="n"), answer([[0.1, 0.2]], name="r")
+    nonlinear, rough = (
+        replace(one, identified=replace(one.identified, terms=count))
+        for one, count in ((nonlinear, 4), (rough, terms))
+    )
+    assert better_of(nonlinear, rough, None).identified.model == believed
+    assert better_of(nonlinear, rough, "linear").identified.model == "r"
 
 
 @pytest.mark.parametrize("foretold", [None, "linear", "nonlinear"])

@@ -235,7 +235,8 @@ def better_of(
 
     The one to believe follows the flights, lasts on each of them, and under half as many controllers of the box as the
     other one does, at least. Where that is so of both, or of neither, it is the one that has foretold flights
-    better which it had not learnt; as long as there are none, the one that misses less of those that it has. Gains have
+    better which it had not learnt. As long as there are none, it is the linear one if that misses less of those that it
+    has with no more terms: with more it does so in any case, and what it lacks are not terms. Gains have
     to be good on both: a linear law may rank them even where it follows badly. But one that diverges where a flight did
     not says nothing of gains, nor does a nonlinear one that even misses more of the flights that it was learnt from
     than a linear one.
@@ -248,7 +249,8 @@ def better_of(
     """
     rank, of_rough = (answer.follows, answer.lasts, lasting[0]), (rough.follows, rough.lasts, lasting[1])
     if foretold is None:
-        foretold = "linear" if rough.worst < answer.worst else "nonlinear"
+        plainer = rough.identified.terms <= answer.identified.terms
+        foretold = "linear" if plainer and rough.worst < answer.worst else "nonlinear"
     if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
         worth = answer.believable and lasting[0] and answer.worst < rough.worst
         return rough.beside(answer) if worth else rough

@@ -62,7 +62,8 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
     if options.libraries and options.directions and not brief:
         found = directions(Problem(context, climber, inputs), climber.sums, context.signals)
         states = range(context.signals.n_x)
-        climber = replace(climber, candidates=climber.candidates.with_directions(found, states))
+        tilts = context.tilts(climber.pool)
+        climber = replace(climber, candidates=climber.candidates.with_directions(found, states, tilts))
     climber = replace(climber, candidates=climber.candidates.growing())
     problem, ladder = Problem(context, climber, inputs), climber.candidates.ladder
     for number, terms in enumerate((ladder[:1] if brief else ladder) if options.libraries else ()):

@@ -74,13 +74,19 @@ class Candidates(Recorded, kind="candidates"):
         return replace(self, pool=pool, ladder=tuple(tuple(dict.fromkeys([*r, *more])) for r in self.ladder))
 
     def with_directions(
-        self, found: Sequence[Direction], states: Iterable[int] = (), *, exact: bool = False
+        self,
+        found: Sequence[Direction],
+        states: Iterable[int] = (),
+        tilts: Sequence[int] = (),
+        *,
+        exact: bool = False,
     ) -> Candidates:
         """The same with terms of directions on the first rung; none that would evade the bounds of a plain one.
 
         Args:
             found: directions, one of which is chosen.
             states: that they are multiplied by, too.
+            tilts: that those in which all pull the same way are multiplied by, too.
             exact: whether shares are known, as those of a mixer, and not constants that were found.
         """
         pool = self.pool.copy()
@@ -90,7 +96,7 @@ class Candidates(Recorded, kind="candidates"):
             # A direction is one of those found, and a share that is not that of all others a constant.
             constants = 0 if exact else unequal(direction)
             choice = float(log(len(found) + 1)) + pool.further * constants
-            for term, plain in terms_of(pool, direction, states).items():
+            for term, plain in terms_of(pool, direction, states, tilts).items():
                 if bounded.isdisjoint(plain):
                     pool.found.setdefault(term, pool.length(plain[0]) + choice)
                     admitted.append(term)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.identification.terms.attitude import turned as turned_by
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import alike_commands
 from twinloop.signals import Signals
@@ -55,8 +56,18 @@ def of_mixer(matrix: Floats, signals: Signals) -> list[Direction]:
     return list(dict.fromkeys(found))
 
 
-def terms_of(pool: Pool, direction: Direction, states: Iterable[int]) -> dict[int, list[int]]:
+def terms_of(
+    pool: Pool, direction: Direction, states: Iterable[int], tilts: Sequence[int] = ()
+) -> dict[int, list[int]]:
     """Terms that a direction makes: itself, its squares, and itself times states.
+
+    Where all pull the same way, as rotors that carry a body, it and its squares are turned by that body's tilts, too.
+
+    Args:
+        pool: that they are entered in.
+        direction: of alike commands.
+        states: that it is multiplied by.
+        tilts: how a body's pose turns what drives it, see `attitude.py`.
 
     Returns:
         By the term's node those of the plain terms that it is made of.
@@ -68,6 +79,10 @@ def terms_of(pool: Pool, direction: Direction, states: Iterable[int]) -> dict[in
     }
     for state in states:
         found[pool.product(state, node)] = [pool.product(state, place) for place in places]
+    for tilt in tilts if all(share > 0.0 for _, share in direction) else ():
+        parts = zip(*(turned_by(pool, tilt, place) for place in places), strict=True)
+        for whole, plain in zip((node, together(pool, direction, squared=True)), parts, strict=True):
+            found[pool.product(tilt, whole)] = list(plain)
     return found
 
 

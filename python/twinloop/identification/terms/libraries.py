@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import combinations, combinations_with_replacement
 
+from twinloop.identification.terms.attitude import attitude
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals, State
 
@@ -121,7 +122,7 @@ def cubic(pool: Pool, signals: Signals) -> Terms:
 
 
 RUNGS: tuple[dict[str, Callable[[Pool, Signals], Terms]], ...] = (
-    {"linear": linear, "quadratic": quadratic, "damping": damping, "roots": roots},
+    {"linear": linear, "quadratic": quadratic, "damping": damping, "roots": roots, "attitude": attitude},
     {"friction": friction, "trigonometric": trigonometric, "quotients": quotients},
     {"cubic": cubic},
 )
