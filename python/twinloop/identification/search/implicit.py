@@ -2,7 +2,9 @@
 
 Multiplied out the law is linear in its constants: y = N − Σ d (y φ). On the right stands for y what the readings show
 of it (`slopes.py`), with the sum of terms that is believed so far where that helps, as it does where commands jump. So
-one search over subsets chooses what is above the line and what below.
+one search over subsets chooses what is above the line and what below. What is left of it is D times what is left of y:
+so D is taken to be 1 where the runs were on average, y = N − Σ d y (φ − φ̄), or the shortest answer of all would be a D
+that vanishes there, whatever y is.
 
 Mangan, Brunton, Proctor and Kutz 2016 for laws that are implicit; here the left side stays an integral of readings.
 """
@@ -77,8 +79,9 @@ def implicit(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Wa
     sums = [known[i] for i in posed]
     costs = [prices(pool, [*upper, *lower], problem.readings(sum_.chain), len(problem.runs)) for sum_ in sums]
     over_line, under = problem.values(upper), problem.values(lower)
+    middle: Floats = under.reshape(-1, len(lower)).mean(axis=0)
     columns = [
-        np.concatenate([over_line, -driving(problem, sum_)[:, :, np.newaxis] * under], axis=2)
+        np.concatenate([over_line, -driving(problem, sum_)[:, :, np.newaxis] * (under - middle)], axis=2)
         for sum_ in sums
     ]
     grams, _ = whitened(problem, sums, columns, costs, walks)
@@ -92,7 +95,7 @@ def implicit(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Wa
             walked += more
     for i, gram, walked in zip(posed, grams, every, strict=True):
         subsets = sorted(walked, key=lambda answer: answer[1])
-        found[i] = _quotients(problem, gram, [subset for subset, _ in subsets], upper, lower)
+        found[i] = _quotients(problem, gram, [subset for subset, _ in subsets], upper, lower, middle)
     return found
 
 
@@ -211,8 +214,18 @@ def _quotients(
     subsets: Sequence[Sequence[int]],
     upper: Sequence[int],
     lower: Sequence[int],
+    middle: Floats,
 ) -> list[Quotient]:
-    """Quotients of subsets, the best first, a denominator of some terms once; none that is longer than without."""
+    """Quotients of subsets, the best first, a denominator of some terms once; none that is longer than without.
+
+    Args:
+        problem: of all chains.
+        gram: of one, of the terms above the line and those below it less their means.
+        subsets: the best first.
+        upper: terms above the line.
+        lower: terms below it.
+        middle: means of those (lower,).
+    """
     found: dict[tuple[int, ...], Quotient] = {}
     for subset in subsets:
         support = tuple(j for j in subset if j >= len(upper))
@@ -222,7 +235,11 @@ def _quotients(
         if solved is None:
             continue
         weights = dict(zip(subset, solved[0].tolist(), strict=True))
-        denominator = tuple((lower[j - len(upper)], weights[j]) for j in support)
+        # It is 1 in the middle, and is written as what is 1 where its terms vanish.
+        at_zero = 1.0 - sum(weights[j] * float(middle[j - len(upper)]) for j in support)
+        if at_zero == 0.0:
+            continue
+        denominator = tuple((lower[j - len(upper)], weights[j] / at_zero) for j in support)
         if matters(problem, denominator):
             found[support] = Quotient((), tuple(upper[j] for j in subset if j < len(upper)), denominator)
     return list(found.values())
