@@ -15,7 +15,7 @@ from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.search.implicit import Quotient
+from twinloop.identification.search.implicit import Quotient, implicit
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.saturation import saturations
@@ -211,6 +211,31 @@ def test_which_state_saturates_shows_behind_noise():
     for repressor, quotients in zip((2, 0, 1), found, strict=True):
         steep = {problem.pool.product(*[repressor] * power) for power in (2, 4)}
         assert steep & {candidate.denominator[0][0] for candidate in quotients}
+
+
+def pulled(gap, rate, current, slope, fall):
+    """What a magnet pulls as its squared current, the less the further it is; neither is ever near 0."""
+    return [rate, 6.0 * (8.0 - gap), slope, 30.0 * (2.0 - current), 9.8 - 200.0 * (current / (1.0 + gap)) ** 2]
+
+
+def test_a_denominator_that_vanishes_where_the_runs_were_is_no_answer():
+    signals = signals_of("abcde", 4.0)
+    problem, every = problem_of(flown(pulled, (10.0, 0.0, 2.8, 0.0, 0.0), 4.0, noise=1e-3), signals)
+    pool = problem.pool
+    gap, current = ([pool.product(*[i] * power) for power in (1, 2)] for i in (0, 2))
+    terms = [pool.one, *gap, *current, pool.product(0, 2)]
+    problem.usable(terms)
+    fall = _fitted(problem, every[4].with_noise(every[4].sensors, (1e-2, 0.0, 1.0)), terms)
+    ((first, *_),) = implicit(problem, signals, [fall], Walks(12_500, 16, Unit(0, (1,))))
+    assert current[1] in first.above
+    assert {term for term, _ in first.denominator} <= {pool.product(*[0] * power) for power in (1, 2, 3, 4)}
+    ends = np.zeros((2, pool.inputs))
+    ends[:, 0] = 6.0, 10.0
+    values = pool.values([term for term, _ in first.denominator], ends)
+    near, far = 1.0 + (values * np.array([weight for _, weight in first.denominator])).sum(axis=1)
+    # As the true one it grows, by about as much.
+    assert near > 0.0
+    assert far / near == pytest.approx((11.0 / 7.0) ** 2, rel=0.2)
 
 
 def test_a_twin_of_noisy_readings_has_the_quotient_and_no_other_one():
