@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from twinloop.errors import unknown
+from twinloop.identification.terms.libraries import LIBRARIES
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,10 @@ ABLATIONS: dict[str, Ablation] = {
     "libraries": Ablation("libraries: evolved programs only", {"libraries": ()}),
     "ladder": Ablation(
         "the upper rungs of the ladder of libraries", {"libraries": ("linear", "quadratic", "damping")}
+    ),
+    "attitude": Ablation(
+        "thrust and weight of a rigid body, turned by its pose, as one term",
+        {"libraries": tuple(name for name in LIBRARIES if name != "attitude")},
     ),
     "directions": Ablation("directions of alike commands, as one term", {"directions": False}),
     "mixer": Ablation("axes of the controller's mixer, as one term", {"mixer": False}),

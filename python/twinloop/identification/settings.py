@@ -26,8 +26,8 @@ class IdentificationOptions:
             they show that a state with a declared derivative takes one, increments where none is declared. With fixed
             or bounded terms, whose constants are meant for one of the two, derivatives are not compared with
             increments: derivatives if any are declared, else increments.
-        libraries: sources of terms, any of "linear", "quadratic", "damping", "roots", "friction", "trigonometric",
-            "quotients", "cubic"; none: evolved programs only.
+        libraries: sources of terms, any of "linear", "quadratic", "damping", "roots", "attitude", "friction",
+            "trigonometric", "quotients", "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they are on
             the first rung of the ladder.
         fixed_terms: known terms of the law, such as "rate: -9.81 * sin(angle)": a driven state, and a formula with

@@ -215,7 +215,13 @@ def test_which_state_saturates_shows_behind_noise():
 
 def pulled(gap, rate, current, slope, fall):
     """What a magnet pulls as its squared current, the less the further it is; neither is ever near 0."""
-    return [rate, 6.0 * (8.0 - gap), slope, 30.0 * (2.0 - current), 9.8 - 200.0 * (current / (1.0 + gap)) ** 2]
+    return [
+        rate,
+        6.0 * (8.0 - gap),
+        slope,
+        30.0 * (2.0 - current),
+        9.8 - 200.0 * (current / (1.0 + gap)) ** 2,
+    ]
 
 
 def test_a_denominator_that_vanishes_where_the_runs_were_is_no_answer():

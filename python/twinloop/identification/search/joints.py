@@ -190,7 +190,9 @@ class _Joints:
     def _overlapping(self, parts: Sequence[Chosen]) -> list[int]:
         """Joints whose equation has commands that another one has, too."""
         moving = [self._moving(part) for part in parts]
-        return [i for i, own in enumerate(moving) if any(own & each for each in (*moving[:i], *moving[i + 1 :]))]
+        return [
+            i for i, own in enumerate(moving) if any(own & each for each in (*moving[:i], *moving[i + 1 :]))
+        ]
 
     def _around(
         self, keeper: int, posed: Sequence[_Posed], parts: Sequence[Chosen], walks: Walks, own: int
@@ -254,7 +256,8 @@ class _Joints:
             for term in offered:
                 allowed = [terms if term is None else (*terms, term) for terms in before]
                 limited = [
-                    self.terms.with_own_mass_of(allowed[i], i, posed[i].costs, posed[i].masses) for i in joints
+                    self.terms.with_own_mass_of(allowed[i], i, posed[i].costs, posed[i].masses)
+                    for i in joints
                 ]
                 tried = several if term is None else several.with_moves(several.moves // SHORTER)
                 grams = [posed[i].gram for i in joints]

@@ -24,7 +24,10 @@ def tilts(pool: Pool, signals: Signals) -> list[int]:
     if body is None or all(names[i] in body.rates for i in signals.driven):
         return []
     waves = [
-        [pool.wave(function, names.index(name), signals.states[names.index(name)].period) for name in body.angles]
+        [
+            pool.wave(function, names.index(name), signals.states[names.index(name)].period)
+            for name in body.angles
+        ]
         for function in ("sin", "cos")
     ]
     (sin_roll, sin_pitch, sin_yaw), (cos_roll, cos_pitch, cos_yaw) = waves
