@@ -43,8 +43,8 @@ FRONTS = {
     ),
     "identification/sensors": "chains euler_steps noise offsets reported",
     "identification/terms": (
-        "bounds candidates denominators directions formulas friction hinges joints libraries pool priors "
-        "sizes"
+        "attitude bounds candidates denominators directions formulas friction hinges joints libraries pool "
+        "priors sizes"
     ),
     "law": (
         "accuracy actuation equations expressions flight flown forms law levels noise parsing pieces reports twin "
