@@ -248,7 +248,7 @@ class Guard:
             used = np.abs(self.signals.difference(reading, self._middle)) / self._half
             i = int(np.argmax(used))
             return self._trip(
-                f"{states[i].name} has left its envelope: {reading[i]:.4g} {states[i].unit}".rstrip()
+                f"{states[i].name} has left its envelope: {in_unit(f'{reading[i]:.4g}', states[i].unit)}"
             )
         if self._band is not None and self._band.alarms(reading):
             count = self._band.outside

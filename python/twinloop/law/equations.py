@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twinloop._ground.texts import in_unit
 from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator, in_periods, partners
 from twinloop.law.expansion import Expansion, Monomial, Polynomial, written
@@ -106,8 +107,8 @@ class Equations:
                 f"{', '.join(body.angles)} are integrated as a quaternion, so that no pitch is singular"
             )
         lines += [
-            f"{state.name} wraps: the equations see it from {-0.5 * state.period:g} to {0.5 * state.period:g}"
-            f" {state.unit}".rstrip()
+            f"{state.name} wraps: the equations see it from"
+            f" {in_unit(f'{-0.5 * state.period:g} to {0.5 * state.period:g}', state.unit)}"
             for state in signals.states
             if state.period is not None
         ]

@@ -10,6 +10,7 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import in_unit
 from twinloop.errors import InvalidInput
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -124,7 +125,7 @@ def _why_cut(last: Floats, lasted: int, limits: Limits) -> str:
     return (
         f"a state left {limits.divergence_factor:g} times its scale, or stopped being finite,"
         f" {(lasted + 1) * limits.signals.dt:.3g} s after the start; before that {state.name} was at"
-        f" {last[worst]:.3g} {state.unit}".rstrip()
+        f" {in_unit(f'{last[worst]:.3g}', state.unit)}"
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop._ground.texts import in_unit
 from twinloop.remarks import Remark, serious
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -32,7 +33,7 @@ class Span:
     high: float
 
     def __str__(self) -> str:
-        return f"{self.state} from {self.low:.3g} to {self.high:.3g} {self.unit}".rstrip()
+        return in_unit(f"{self.state} from {self.low:.3g} to {self.high:.3g}", self.unit)
 
 
 def spans(signals: Signals, flights: Sequence[Trajectory]) -> tuple[Span, ...]:
@@ -68,9 +69,9 @@ def far_beyond(found: Sequence[Span], run: Trajectory, signals: Signals) -> Iter
         if _beyond(span, furthest) > room:
             yield serious(
                 "beyond-flown",
-                f"The simulated run takes {span.state} to {furthest:.3g} {span.unit}".rstrip()
-                + f", and the flights went from {span.low:.3g} to {span.high:.3g}: the twin was not learnt there, and"
-                " its band does not know how wrong it may be. Fly nearer first.",
+                f"The simulated run takes {span.state} to {in_unit(f'{furthest:.3g}', span.unit)}, and the flights"
+                f" went from {span.low:.3g} to {span.high:.3g}: the twin was not learnt there, and its band does not"
+                " know how wrong it may be. Fly nearer first.",
             )
 
 

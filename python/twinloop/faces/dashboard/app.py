@@ -17,6 +17,7 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from twinloop._experiment.envelope import is_bounded
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
 from twinloop.faces.cautions import serious_of
@@ -205,7 +206,7 @@ class Pages:
                 {
                     "number": test.number,
                     "gains": {
-                        name: f"{value:.6g} {units.get(name, '')}".rstrip()
+                        name: in_unit(f"{value:.6g}", units.get(name, ""))
                         for name, value in test.parameters.items()
                     },
                     "predicted": None if test.predicted is None else f"{test.predicted:.4g}",

@@ -9,7 +9,7 @@ from twinloop import _core
 from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.assessment import number_of, predicted_quality
 from twinloop.campaign.examination.checking import checks
-from twinloop.faces.figures.units import words
+from twinloop.faces.figures.units import shown_unit, words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables.table import Table, shown_value
@@ -81,10 +81,9 @@ def _answers(source: Source) -> list[Row]:
             for i, state in enumerate(found.signals.states)
         ]
     rmse = campaign.rmse
-    rows += [
-        (f"error of whole flights, {words(state.name)} ({state.unit or '1'})", float(rmse[i]))
-        for i, state in enumerate(found.signals.states)
-    ]
+    for state, error in zip(found.signals.states, rmse.tolist(), strict=True):
+        factor, shown = shown_unit(state.unit)
+        rows.append((f"error of whole flights, {words(state.name)} ({shown})", factor * error))
     rows.append(("controller", "none" if best is None else controller_name(number_of(campaign, best))))
     if best is not None:
         predicted, spread = predicted_quality(best, found.experiments)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.remaining import duration
 from twinloop.faces.report.tables.table import Table, shown_value
 
@@ -34,10 +35,8 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
     if cost["abandoned"]:
         rows.insert(2, ["tests that were not flown", str(cost["abandoned"])])
     if cost["given_away"] is not None:
-        given = f"{shown_value(cost['given_away'])} {unit}".rstrip()
-        rows.append(
-            ["cumulative regret", f"{given} over a best of {shown_value(cost['best'])} {unit}".rstrip()]
-        )
+        given, best = (in_unit(shown_value(cost[name]), unit) for name in ("given_away", "best"))
+        rows.append(["cumulative regret", f"{given} over a best of {best}"])
     if elapsed is not None:
         rows.append(["elapsed time to the last recorded flight", duration(elapsed)])
     note = (
