@@ -12,7 +12,7 @@ from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
-from twinloop.identification.terms.attitude import attitude, tilts, turned
+from twinloop.identification.terms.attitude import attitude, tilted, tilts
 from twinloop.identification.terms.directions import of_mixer, terms_of, together
 from twinloop.identification.terms.pool import Pool
 
@@ -52,7 +52,7 @@ def test_a_tilt_is_as_short_as_an_input_and_times_a_command_as_a_product_of_two(
     signals, pool = body(rotors=0, thrust=True), Pool(8)
     tilt = tilts(pool, signals)[2]
     assert pool.length(tilt) == pool.length(0)
-    assert [pool.length(node) for node in turned(pool, tilt, 7)] == [pool.length(pool.product(0, 7))] * 2
+    assert [pool.length(node) for node in tilted(pool, tilt, 7)] == [pool.length(pool.product(0, 7))] * 2
     # Five tilts, alone and times the thrust and its square.
     assert len(set(attitude(pool, signals))) == 15
 

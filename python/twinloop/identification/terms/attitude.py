@@ -45,7 +45,7 @@ def tilts(pool: Pool, signals: Signals) -> list[int]:
     return found
 
 
-def turned(pool: Pool, tilt: int, command: int) -> list[int]:
+def tilted(pool: Pool, tilt: int, command: int) -> list[int]:
     """The nodes of a command and of its square, times a tilt: each as short as a product of two inputs."""
     nodes = [pool.product(tilt, factor) for factor in (command, pool.product(command, command))]
     for node in nodes:
@@ -57,4 +57,4 @@ def attitude(pool: Pool, signals: Signals) -> list[int]:
     """Tilts, alone and times each command that has none alike; of those that have, directions are turned."""
     found = tilts(pool, signals)
     single = [signals.n_x + group[0] for group in alike_commands(signals) if len(group) == 1]
-    return [*found, *(node for pair in product(found, single) for node in turned(pool, *pair))]
+    return [*found, *(node for pair in product(found, single) for node in tilted(pool, *pair))]

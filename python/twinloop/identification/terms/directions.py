@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.identification.terms.attitude import turned as turned_by
+from twinloop.identification.terms.attitude import tilted
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import alike_commands
 from twinloop.signals import Signals
@@ -80,7 +80,7 @@ def terms_of(
     for state in states:
         found[pool.product(state, node)] = [pool.product(state, place) for place in places]
     for tilt in tilts if all(share > 0.0 for _, share in direction) else ():
-        parts = zip(*(turned_by(pool, tilt, place) for place in places), strict=True)
+        parts = zip(*(tilted(pool, tilt, place) for place in places), strict=True)
         for whole, plain in zip((node, together(pool, direction, squared=True)), parts, strict=True):
             found[pool.product(tilt, whole)] = list(plain)
     return found
