@@ -19,7 +19,7 @@ from twinloop.identification.search.implicit import Quotient, implicit
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.saturation import saturations
-from twinloop.identification.search.structure import Sum
+from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import IdentificationOptions
@@ -181,6 +181,45 @@ def test_a_denominator_whose_terms_are_dropped_while_another_one_is_refined_is_g
     assert term == 0
     assert constant == pytest.approx(1.25, rel=1e-4)
     assert len(found.weights) == 1
+
+
+def inhibited(s, p):
+    """A substrate that slows its own reaction."""
+    reaction = 2.0 * s / (0.6 + s + 0.5 * s * s)
+    return [0.5 - reaction, reaction - 0.3 * p]
+
+
+def test_two_chains_pay_together_for_a_denominator_that_is_too_dear_for_each():
+    signals = signals_of("sp", 5.0)
+    problem, both = problem_of(flown(inhibited, (1.6, 0.5), 5.0, noise=0.01), signals)
+    pool = problem.pool
+    terms = [pool.one, 0, 1, pool.product(0, 0), pool.product(1, 1), pool.product(0, 1)]
+    problem.usable(terms)
+    walks = Walks(12_500, 16, Unit(0, (1,)))
+    known = search(problem, both, terms, [None, None], walks)
+    found = with_quotients(problem, signals, known, (), walks)
+    (shared,) = denominators(pool, [term for sum_ in found for term in sum_.weights])
+    # Searched with s alone below the line, and lengthened by its square.
+    assert [term for term, _ in shared] == [0, pool.product(0, 0)]
+    assert [weight for _, weight in shared] == pytest.approx([1.0 / 0.6, 0.5 / 0.6], rel=0.1)
+    assert all(over(pool, 0, shared) in sum_.weights for sum_ in found)
+    # Alone neither gains as much as a denominator must.
+    for new, old in zip(found, known, strict=True):
+        assert new.description_length < old.description_length
+    (loss,) = with_quotients(problem, signals, known[:1], (), walks)
+    assert denominators(pool, loss.weights) == []
+
+
+def test_a_denominator_stays_one_where_two_chains_share_it_and_it_is_refined():
+    signals = signals_of("sp", 8.0)
+    problem, both = problem_of(flown(saturating, (5.0, 0.2), 8.0, noise=0.01), signals)
+    ratio = over(problem.pool, 0, ((0, 1.0),))
+    problem.usable([ratio, 1])
+    known = [_fitted(problem, chain, [ratio, 1][: i + 1]) for i, chain in enumerate(both)]
+    found = renewed(problem, signals, known, Walks(12_500, 16, Unit(0, (1,))))
+    (((term, constant),),) = denominators(problem.pool, [term for sum_ in found for term in sum_.weights])
+    assert term == 0
+    assert constant == pytest.approx(1.25, rel=0.1)
 
 
 def test_where_no_quotient_is_worth_its_price_sums_stay_the_very_same():

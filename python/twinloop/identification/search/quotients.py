@@ -21,11 +21,14 @@ from twinloop.identification.search.structure import Sum, prices, search
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.denominators import (
+    HIGHEST,
     Denominator,
     above,
     denominators,
     over,
     plain,
+    power_of,
+    powers_in,
     quotient,
 )
 from twinloop.signals import Signals
@@ -62,7 +65,7 @@ def with_quotients(
         A sum for each chain, the very one that was known where no quotient is worth its price.
     """
     finder = _Finder(problem, signals, terms, walks)
-    best = list(known)
+    best = finder.shared(known)
     for number in range(ROUNDS):
         candidates = [
             [*first, *second]
@@ -88,7 +91,7 @@ def renewed(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Wal
     Args and returns as those of `with_quotients`.
     """
     finder = _Finder(problem, signals, (), walks)
-    best = [finder.renewed(found) for found in known]
+    best = finder.shared([finder.renewed(found) for found in known])
     finder.price(best)
     return best
 
@@ -106,15 +109,56 @@ class _Finder:
         best = list(known)
         for i, quotients in enumerate(candidates):
             for candidate in quotients:
-                found = self._with(known[i], candidate)
+                found = self._lengthened(known[i], self._with(known[i], candidate))
                 if found is None or not shorter(found.description_length, best[i].description_length):
                     continue
                 rival = self._rival(known[i], found.chain)
-                if shorter(found.description_length + WORTH, rival.description_length):
+                longest = rival.description_length
+                if not shorter(found.description_length + WORTH, longest):
+                    longest += self._saved(found, i, known, candidates)
+                if shorter(found.description_length + WORTH, longest):
                     best[i] = found
                 elif shorter(rival.description_length, best[i].description_length):
                     best[i] = rival
         return best
+
+    def _lengthened(self, known: Sum, found: Sum | None) -> Sum | None:
+        """A sum over a denominator of one power of a state, or the one over the next power too, if that is shorter.
+
+        Plain terms stand in for it where the runs were, and run away elsewhere: so it has to do without those.
+        """
+        for own in [] if found is None else self._all([found]):
+            powers = powers_in(self.pool, own)
+            state, highest = next(iter(powers.items())) if len(powers) == 1 else (None, HIGHEST)
+            if found is None or state is None or len(own) > 1 or highest == HIGHEST:
+                continue
+            split = self._split(found, own)
+            plain_ = tuple(term for term in split.plain if state not in self.pool.leaves(term))
+            if not split.above or plain_ == split.plain:
+                continue
+            longer = (*own, (power_of(self.pool, state, highest + 1), 0.0))
+            again = self._with(known, Quotient(plain_, split.above, longer))
+            if again is not None and shorter(again.description_length, found.description_length):
+                found = again
+        return found
+
+    def _saved(
+        self, found: Sum, place: int, known: Sequence[Sum], candidates: Sequence[Sequence[Quotient]]
+    ) -> float:
+        """By how much other chains get shorter over a sum's denominator, nats: those whose own are of its state, too.
+
+        What one equation pays for a denominator may be too much for it alone: what one substance loses another gains.
+        """
+        total = 0.0
+        for denominator in self._all([found]):
+            states = powers_in(self.pool, denominator).keys()
+            for j, (other, own) in enumerate(zip(known, candidates, strict=True)):
+                alike = any(powers_in(self.pool, each.denominator).keys() == states for each in own)
+                if j == place or not alike:
+                    continue
+                over_it = self._searched(other.chain, denominator, other)
+                total += max(0.0, other.description_length - over_it.description_length)
+        return total
 
     def shared(self, known: Sequence[Sum]) -> list[Sum]:
         """The same, or sums over a denominator that another chain has paid for."""

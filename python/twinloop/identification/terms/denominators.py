@@ -45,6 +45,18 @@ def power_of(pool: Pool, node: int, power: int) -> int:
     return pool.product(*[node] * power)
 
 
+def powers_in(pool: Pool, denominator: Denominator) -> dict[int, int]:
+    """The highest power of each state that a denominator has alone, by the state; empty where it has other terms."""
+    found: dict[int, int] = {}
+    for node, _ in denominator:
+        leaves = pool.leaves(node)
+        state = leaves[0]
+        if state is None or node != power_of(pool, state, len(leaves)):
+            return {}
+        found[state] = max(found.get(state, 0), len(leaves))
+    return found
+
+
 def plain(pool: Pool, signals: Signals) -> list[int]:
     """Terms that stand beside quotients: none of those that resemble one where the runs were, as roots do."""
     terms = [pool.one, *coordinates(pool, signals), *quadratic(pool, signals)]
