@@ -600,13 +600,15 @@ def qualities(
     *,
     noise: ArrayLike | None = None,
     offsets: ArrayLike | None = None,
+    disturbances: ArrayLike | None = None,
     measured: bool = False,
     workers: Workers | None = None,
 ) -> tuple[_Floats, _Floats]:
     """Quality and usage of the envelope of every flight, both (members, draws, K).
 
-    noise (D, n + 1, n_x) is added to what the controllers read, offsets (D, n_x) to the initial states; both
-    are the same for all candidates and members. measured: the quality is that of the readings.
+    noise (D, n + 1, n_x) is added to what the controllers read, offsets (D, n_x) to the initial states, and
+    disturbances (D, n, n_x) to the true state after each step; all are the same for all candidates and members.
+    measured: the quality is that of the readings.
     """
 
 def disagreements(

@@ -88,6 +88,7 @@ def qualities(
     *,
     noise: ArrayLike | None = None,
     offsets: ArrayLike | None = None,
+    disturbances: ArrayLike | None = None,
     measured: bool = False,
     workers: _core.Workers | None = None,
 ) -> tuple[Floats, Floats]:
@@ -102,6 +103,7 @@ def qualities(
         signals: of the system, with its envelope.
         noise: D draws of the sensor noise (D, n + 1, n_x), in the units of the states; None: perfect sensors.
         offsets: D draws of a change of the initial state (D, n_x); None: no change.
+        disturbances: D draws of what moves the true state after each step (D, n, n_x); None: nothing does.
         measured: whether qualities are of the readings, as in a record of the flight, or of the true states.
         workers: threads of the engine; one by default.
 
@@ -116,7 +118,7 @@ def qualities(
     envelope = [state.envelope for state in signals.states]
     return _core.qualities(
         dynamics, flights, measure, envelope,
-        noise=noise, offsets=offsets, measured=measured, workers=workers,
+        noise=noise, offsets=offsets, disturbances=disturbances, measured=measured, workers=workers,
     )  # fmt: skip
 
 

@@ -118,6 +118,7 @@ ABLATIONS: dict[str, Ablation] = {
     "backtracking": Ablation("candidates on the way to the tuned gains", {"backtracking": False}),
     "within": Ablation("gains tuned under the limits of the next flight", {"within": False}),
     "noise-draws": Ablation("sensor noise while gains are tuned", {"draws": 1}),
+    "gusts-draws": Ablation("disturbances that flights met while gains are tuned", {"tuned_in_gusts": False}),
     "members": Ablation("gains tuned on several members", {"tuning_members": 1}),
     "starts": Ablation("several starts of the tuning of gains", {"tuning_starts": 1}),
     "delay-margin": Ablation(

@@ -49,14 +49,14 @@ class Drawn:
         )
         self.setting, self.count = setting, count
 
-    def run(self, model, i, noise=None, offset=0.0):
+    def run(self, model, i, noise=None, offset=0.0, disturbance=None):
         """The trajectory of one candidate, alone."""
         task = _core.Task(self.initial[i] + offset, self.target[i], STEPS)
         excitation = None if self.excitation is None else self.excitation[i : i + 1]
-        noise = None if noise is None else noise[None]
+        noise, disturbance = (None if drawn is None else drawn[None] for drawn in (noise, disturbance))
         genes = self.genes[i : i + 1]
         return _core.rollout(
-            model, self.setting, genes, task, noise=noise, excitation=excitation
+            model, self.setting, genes, task, noise=noise, excitation=excitation, disturbance=disturbance
         )  # fmt: skip
 
 
@@ -85,16 +85,17 @@ def expected_usage(states):
 def test_every_flight_is_judged_by_its_own_trajectory(rig_setting, committee, kind, count, costs):
     drawn, stream, weights = Drawn(rig_setting, count), np.random.default_rng(1), np.array([2.0, 0.5])
     noise, offsets = stream.normal(0.0, 0.05, (3, STEPS + 1, 2)), stream.normal(0.0, 0.1, (3, 2))
+    gusts = stream.normal(0.0, 0.1, (3, STEPS, 2))
     measure = _core.Quality(kind, weights, effort=costs[0], effort_rate=costs[1])
     qualities, usages = _core.qualities(
-        committee, drawn.flights, measure, ENVELOPE, noise=noise, offsets=offsets
+        committee, drawn.flights, measure, ENVELOPE, noise=noise, offsets=offsets, disturbances=gusts
     )
     assert qualities.shape == usages.shape == (4, 3, count)
     diverged = 0
     for m, model in enumerate(committee):
         for d in range(3):
             for i in range(count):
-                run = drawn.run(model, i, noise[d], offsets[d])
+                run = drawn.run(model, i, noise[d], offsets[d], gusts[d])
                 if run.lasted[0] < STEPS:
                     diverged += 1
                     assert np.isinf(qualities[m, d, i]) and np.isinf(usages[m, d, i])
@@ -139,9 +140,10 @@ def test_without_draws_there_is_one_flight_without_noise(rig_setting, committee)
     )
     assert found[0].shape == (4, 1, 5)
     assert same_bits(found[0], silent[0]) and same_bits(found[1], silent[1])
-    only_offsets = _core.qualities(committee, drawn.flights, measure, ENVELOPE, offsets=np.zeros((2, 2)))
-    assert only_offsets[0].shape == (4, 2, 5)
-    assert same_bits(only_offsets[0][:, 1], found[0][:, 0])
+    for only in ({"offsets": np.zeros((2, 2))}, {"disturbances": np.zeros((2, STEPS, 2))}):
+        twice = _core.qualities(committee, drawn.flights, measure, ENVELOPE, **only)
+        assert twice[0].shape == (4, 2, 5)
+        assert same_bits(twice[0][:, 1], found[0][:, 0])
 
 
 def test_the_true_state_uses_the_envelope_and_states_without_one_do_not(rig_setting, committee):
@@ -281,6 +283,13 @@ JUDGEMENTS = {
     "offsets for other draws": lambda m, f: _core.qualities(
         m, f, _core.Quality("iae", [1, 1]), ENVELOPE,
         noise=np.zeros((2, STEPS + 1, 2)), offsets=np.zeros((3, 2)),
+    ),
+    "disturbances for other draws": lambda m, f: _core.qualities(
+        m, f, _core.Quality("iae", [1, 1]), ENVELOPE,
+        noise=np.zeros((2, STEPS + 1, 2)), disturbances=np.zeros((3, STEPS, 2)),
+    ),
+    "disturbances of another length": lambda m, f: _core.qualities(
+        m, f, _core.Quality("iae", [1, 1]), ENVELOPE, disturbances=np.zeros((2, STEPS + 1, 2))
     ),
     "nobody to judge": lambda m, f: _core.qualities([], f, _core.Quality("iae", [1, 1]), ENVELOPE),
     "nobody to disagree": lambda m, f: _core.disagreements([], f, [1.0, 1.0]),

@@ -2,14 +2,18 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import twinloop as tl
 from strategies import program_text
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.streams import Unit
+from twinloop.campaign.presets import options_of
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 from twinloop.planning.gusts import DRAWS, UNMOVED, Gusts, Moved
+from twinloop.planning.judging import Committee, Task
+from twinloop.planning.planner import Planner
 from twinloop.planning.quality import quality_of
 
 DT, STEPS, KICK = 0.1, 60, 0.01
@@ -85,3 +89,48 @@ def test_flights_that_diverge_have_left():
 
 def test_where_nothing_disturbs_nothing_is_moved():
     assert moved(Noise.of_sensors(np.ones(1))) == UNMOVED
+
+
+def gusts_of(model, noise):
+    return Gusts(model, noise, quality_of("iae", SIGNALS, [1.0]), UNIT, Limits(SIGNALS), WORKERS)
+
+
+def integrator():
+    """x' = u."""
+    program = _core.Program.parse(program_text(2, 1, 3, [["r2 = r1 * 1.0"]]))
+    return _core.Model(program, "acceleration", SIGNALS.engine)
+
+
+def test_every_draw_has_its_opposite_and_is_the_same_each_time():
+    noise = Noise(np.zeros(1), np.array([KICK]), dt=DT)
+    one, other = (gusts_of(integrator(), noise).drawn(8, STEPS) for _ in range(2))
+    assert one.shape == (8, STEPS, 1) and np.abs(one).min() > 0.0
+    assert (one[:4] == -one[4:]).all() and (one == other).all()
+
+
+def test_gains_are_tuned_for_the_disturbances_that_flights_meet():
+    """x grows by w - b (x + n): a high gain fights w and a low one n, and (b² n² + w²) / (2 b - b²) is left."""
+    kick, sensor, steps = 0.02, 0.1, 400
+    family = tl.controllers.PID(
+        axes=[("x", None)], gains={"x.kp": (0.01, 9.0, "log"), "x.ki": 0.0, "x.kd": 0.0}
+    ).bind(SIGNALS)
+    model, start = integrator(), np.zeros(1)
+    planner = Planner(
+        family, Task(start, start, steps), quality_of("iae", SIGNALS, [1.0]),
+        options_of("default", {"evaluations": 2000}), limits=Limits(SIGNALS), seed=5, workers=WORKERS,
+    )  # fmt: skip
+    sds, met = np.array([sensor]), Noise(np.array([sensor]), np.array([kick]), dt=DT)
+    gusts = gusts_of(model, met)
+    committees = [
+        Committee([model], sds, True, gusts=gusts, foretells=foretells) for foretells in (True, False)
+    ]
+    tuned = [planner.tune(committee, [family.genes({"x.kp": 1.0})], 0) for committee in committees]
+    gusty, calm = (tl.Test(family, genes, start, start, steps).parameters["x.kp"] for genes in tuned)
+    left = minimize_scalar(
+        lambda b: (b * b * sensor * sensor + kick * kick) / (2.0 * b - b * b),
+        bounds=(1e-3, 1.0),
+        method="bounded",
+    )
+    assert gusty == pytest.approx(left.x / DT, rel=0.2)
+    # What rests at its target in calm is best left alone.
+    assert calm < 0.02

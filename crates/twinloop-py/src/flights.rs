@@ -142,7 +142,8 @@ pub enum Members<'py> {
 /// Quality and usage of the envelope of every flight (members, draws, K).
 #[pyfunction]
 #[pyo3(signature = (
-    dynamics, flights, quality, envelope, *, noise = None, offsets = None, measured = false, workers = None
+    dynamics, flights, quality, envelope, *, noise = None, offsets = None, disturbances = None, measured = false,
+    workers = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "what a judgement needs, named by keyword in Python")]
 #[expect(clippy::type_complexity, reason = "two arrays")]
@@ -154,22 +155,24 @@ pub fn qualities<'py>(
     #[pyo3(from_py_with = given)] envelope: Vec<Option<(f64, f64)>>,
     noise: Option<Cube<'py>>,
     offsets: Option<Matrix<'py>>,
+    disturbances: Option<Cube<'py>>,
     measured: bool,
     workers: Option<&PyWorkers>,
 ) -> Result<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
     let workers = or_default(workers)?;
     let (flights, quality, envelope) = (&flights.0, &quality.0, Envelope::new(&envelope)?);
     let n_x = flights.signals().states();
-    let draws = noise.as_ref().map_or(1, |noise| noise.as_array().shape()[0]);
+    let draws = noise.as_ref().or(disturbances.as_ref()).map_or(1, |given| given.as_array().shape()[0]);
     if draws == 0 || offsets.as_ref().is_some_and(|offsets| offsets.as_array().nrows() == 0) {
         return Err(misuse(
-            "draws: expected at least one of noise and of offsets, or None, found none".into(),
+            "draws: expected at least one of noise, of offsets and of disturbances, or None, found none".into(),
         ));
     }
     let noise = optional_blocks("noise", noise, [draws, flights.steps() + 1, n_x])?;
+    let disturbances = optional_blocks("disturbances", disturbances, [draws, flights.steps(), n_x])?;
     let offsets = optional_rows("offsets", offsets, n_x)?;
-    let (noise, offsets) = (views(&noise), views(&offsets));
-    let draws = Draws { noise: &noise, offsets: &offsets, measured };
+    let (noise, offsets, disturbances) = (views(&noise), views(&offsets), views(&disturbances));
+    let draws = Draws { noise: &noise, offsets: &offsets, disturbances: &disturbances, measured };
     let (members, judged) = match dynamics {
         Members::Plant(plant) => {
             let plant = plant.get();

@@ -90,16 +90,25 @@ class Gusts:
         """What they do to the flights that it was asked of so far."""
         return {}
 
+    def drawn(self, draws: int, steps: int) -> Floats:
+        """What moves the states after each step (draws, n, n_x): half of them drawn, always alike, and their opposites.
+
+        Args:
+            draws: an even number of them.
+            steps: n of them.
+        """
+        if (draws, steps) not in self._drawn:
+            half = self.noise.disturbance(draws // 2, steps, self.unit.stream("repeats"))
+            self._drawn[draws, steps] = np.concatenate([half, -half])
+        return self._drawn[draws, steps]
+
     @cached_property
-    def _drawn(self) -> dict[int, Floats]:
-        """Draws (`DRAWS`, n, n_x), by the number of steps."""
+    def _drawn(self) -> dict[tuple[int, int], Floats]:
+        """Draws by their number and that of the steps."""
         return {}
 
     def _moved(self, test: Test) -> Moved:
-        if test.steps not in self._drawn:
-            half = self.noise.disturbance(DRAWS // 2, test.steps, self.unit.stream("repeats"))
-            self._drawn[test.steps] = np.concatenate([half, -half])
-        drawn = self._drawn[test.steps]
+        drawn = self.drawn(DRAWS, test.steps)
         if not drawn.any():
             return UNMOVED
         still = np.zeros((1, *drawn.shape[1:]))

@@ -57,6 +57,7 @@ class Committee:
     explains: bool = True
     gusts: Gusts | None = None
     tuned_delayed: Sequence[_core.Model] = ()
+    foretells: bool = False
 
     @property
     def predicts_limits(self) -> bool:
@@ -65,6 +66,21 @@ class Committee:
         Of a model that does not explain the runs, the gains that are best within limits are best because of its errors.
         """
         return self.trusted and self.explains
+
+    def disturbances(self, draws: int, steps: int) -> Floats | None:
+        """Draws of known disturbances (draws, n, n_x), the same for all candidates; None where nothing disturbs.
+
+        Nor where the committee has foretold nothing yet: a wrong law takes its errors for disturbances, and gains that
+        fight these are the higher the more it is wrong.
+
+        Args:
+            draws: of them.
+            steps: n of a flight.
+        """
+        if self.gusts is None or not self.foretells or draws < 2:
+            return None
+        drawn = self.gusts.drawn(draws + draws % 2, steps)[:draws]
+        return drawn if drawn.any() else None
 
     def moved_by_gusts(self, test: Test) -> Moved:
         """What known disturbances do to a flight."""
@@ -193,8 +209,9 @@ class Judge:
         measured: bool = False,
         off: Floats | None = None,
         hold_back: HoldBack | None = None,
+        disturbances: Floats | None = None,
     ) -> Judged:
-        """Flies candidates on members under noise.
+        """Flies candidates on members under noise, and under disturbances where they are given (draws, n, n_x).
 
         Qualities are those of the true states, which gains are chosen by, or, `measured`, those that a record of the
         flight would give. Where `off` is given flights begin elsewhere, as far as it says (n_x,), drawn like noise.
@@ -206,7 +223,7 @@ class Judge:
         )
         values, usages = qualities(
             members, self.flights(genes, excitation, ends, hold_back), self.quality.engine, self.signals,
-            noise=noise, offsets=offsets, measured=measured, workers=self.workers,
+            noise=noise, offsets=offsets, disturbances=disturbances, measured=measured, workers=self.workers,
         )  # fmt: skip
         return Judged(values, usages)
 

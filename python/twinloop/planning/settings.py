@@ -48,6 +48,7 @@ class PlanningOptions:
         evaluations: number of flights on which gains are tuned at most, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
+        tuned_in_gusts: whether gains are tuned, and compared with flown ones, in the disturbances that flights met too.
         delay_margin: whether gains are tuned with, and must tolerate, one more period of delay; for each of the last
             predictions of new gains in a row that came true, or that the flight was better than, the delay that gains
             must tolerate is halved, and the one that they are tuned with is quartered.
@@ -86,6 +87,7 @@ class PlanningOptions:
     evaluations: int = 12_000
     tuning_starts: int = 3
     tuning_members: int = 4
+    tuned_in_gusts: bool = True
     delay_margin: bool = True
     confidence: float = 0.8
     track_record: bool = True

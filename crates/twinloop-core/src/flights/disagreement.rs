@@ -88,7 +88,7 @@ impl Fly<'_> {
         let lanes = self.group.lanes::<V>();
         let (steps, row) = (self.flights.steps, lanes.initial.len() * V::LANES);
         let mut states = States(vec![0.0; steps * row]);
-        let lasted = rollout((*self.member).into(), &self.flights.start(&lanes, &[]), &mut states);
+        let lasted = rollout((*self.member).into(), &self.flights.start(&lanes, &[], &[]), &mut states);
         let States(mut states) = states;
         for (l, &lasted) in lasted.iter().enumerate() {
             for step in lasted..steps {

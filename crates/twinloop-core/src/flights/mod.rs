@@ -109,7 +109,12 @@ impl Flights {
 
     /// What a roll-out of a group starts from.
     #[inline(always)]
-    fn start<'a, V: Vector>(&'a self, lanes: &'a GroupLanes<V>, noise: &'a [V]) -> Start<'a, V> {
+    fn start<'a, V: Vector>(
+        &'a self,
+        lanes: &'a GroupLanes<V>,
+        noise: &'a [V],
+        disturbance: &'a [V],
+    ) -> Start<'a, V> {
         Start {
             commands: Commands::Law {
                 family: self.setting.family(),
@@ -121,7 +126,7 @@ impl Flights {
             steps: self.steps,
             limits: self.setting.limits(),
             noise,
-            disturbance: &[],
+            disturbance,
         }
     }
 }

@@ -16,6 +16,8 @@ pub struct Draws<'a> {
     pub noise: &'a [&'a [f64]],
     /// What is added to the initial states, n_x a draw; empty for nothing.
     pub offsets: &'a [&'a [f64]],
+    /// What is added to the true state after each step, n × n_x a draw: gusts; empty for nothing.
+    pub disturbances: &'a [&'a [f64]],
     /// Whether qualities are those of the readings, as a record of a flight gives them, or of the true states.
     pub measured: bool,
 }
@@ -23,7 +25,7 @@ pub struct Draws<'a> {
 impl Draws<'_> {
     /// Flights of each candidate on each member: one without noise where there are no draws.
     pub fn count(&self) -> usize {
-        self.noise.len().max(self.offsets.len()).max(1)
+        self.noise.len().max(self.offsets.len()).max(self.disturbances.len()).max(1)
     }
 
     fn check(&self, flights: &Flights) -> Result<()> {
@@ -33,12 +35,14 @@ impl Draws<'_> {
             (rows.is_empty() || rows.len() == count)
                 && rows.iter().all(|row| row.len() == length && row.iter().all(|x| x.is_finite()))
         };
-        if !fits(self.noise, noise) || !fits(self.offsets, n_x) {
+        if !fits(self.noise, noise) || !fits(self.offsets, n_x) || !fits(self.disturbances, n * n_x) {
             return invalid(format!(
-                "draws: expected none or {count} of noise, {noise} finite numbers each, and none or as many of \
-                 offsets, {n_x} each, found {} and {}",
+                "draws: expected none or {count} of noise, {noise} finite numbers each, of offsets, {n_x} each, and of \
+                 disturbances, {} each, found {}, {} and {}",
+                n * n_x,
                 self.noise.len(),
-                self.offsets.len()
+                self.offsets.len(),
+                self.disturbances.len()
             ));
         }
         Ok(())
@@ -76,9 +80,11 @@ pub fn qualities(
         let (draw, group) = (unit / groups % count, &flights.groups[unit % groups]);
         let dynamics = &dynamics[unit / groups / count];
         let row = |rows: &[&'_ [f64]]| rows.get(draw).map_or(vec![], |row| row.to_vec());
-        let (noise, offset) = (row(draws.noise), row(draws.offsets));
-        let (noise, offset, measured) = (noise.as_slice(), offset.as_slice(), draws.measured);
-        let of_group = OfGroup { dynamics, flights, group, quality, envelope, noise, offset, measured };
+        let (noise, offset, disturbance) = (row(draws.noise), row(draws.offsets), row(draws.disturbances));
+        let (noise, offset, disturbance) = (noise.as_slice(), offset.as_slice(), disturbance.as_slice());
+        let measured = draws.measured;
+        let of_group =
+            OfGroup { dynamics, flights, group, quality, envelope, noise, offset, disturbance, measured };
         dispatch(workers.width(), of_group)
     });
     Ok(judged.concat())
@@ -94,6 +100,8 @@ struct OfGroup<'a> {
     noise: &'a [f64],
     /// n_x, or empty.
     offset: &'a [f64],
+    /// n × n_x, or empty.
+    disturbance: &'a [f64],
     measured: bool,
 }
 
@@ -113,7 +121,7 @@ impl OfGroup<'_> {
         for (initial, &offset) in lanes.initial.iter_mut().zip(self.offset) {
             *initial = *initial + V::splat(offset);
         }
-        let noise = splats::<V>(self.noise);
+        let (noise, disturbance) = (splats::<V>(self.noise), splats::<V>(self.disturbance));
         let mut judge = Judge {
             tally: self.quality.tally(self.flights.signals(), &lanes.target),
             reach: self.envelope.reach(&self.flights.signals().periods, &lanes.initial),
@@ -121,7 +129,7 @@ impl OfGroup<'_> {
             measured: self.measured,
             reading: lanes.initial.clone(),
         };
-        let lasted = rollout(*self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
+        let lasted = rollout(*self.dynamics, &self.flights.start(&lanes, &noise, &disturbance), &mut judge);
         let (quality, usage) = (judge.tally.total(), judge.reach.usage());
         let of_lane = |l: usize| {
             if lasted[l] < self.flights.steps {

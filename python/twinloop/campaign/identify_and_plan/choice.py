@@ -84,7 +84,8 @@ class Choice:
             )
             return self._tuned(tuned, judged, recorded, reason)
         flies, own = standing.flies(self.book, flown.number), self._fared(flown)
-        new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
+        in_gusts = self._in_gusts(members, genes, judged).qualities
+        new, old = in_gusts[:, :, 0].ravel(), in_gusts[:, :, 1].ravel()
         better = float(((1.0 + self._worth) * new < old).mean())
         if flies and not refused:
             refused = self._not_preferred(recorded, tuned, flown, better)
@@ -267,6 +268,13 @@ class Choice:
     def _moved(self, genes: Floats) -> Moved:
         """What known disturbances do to the task's flight with some gains (size,), without excitation."""
         return self.committee.moved_by_gusts(self.book.of_task(genes, len(self.book.tests)))
+
+    def _in_gusts(self, members: Sequence[_core.Model], genes: Floats, calm: Judged) -> Judged:
+        """What members make of gains in known disturbances; what they make of them in calm where there are none."""
+        gusts = self.planner.gusts(self.committee, self.draws)
+        if gusts is None:
+            return calm
+        return self.planner.judge(members, genes, self.committee.sds, self.draws, disturbances=gusts)
 
     def _judge(
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None

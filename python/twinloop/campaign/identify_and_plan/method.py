@@ -318,6 +318,7 @@ class IdentifyAndPlan:
             latest.explained,
             self._gusts(latest, len(book.experiments)),
             slower(TUNED_WITH) if true else borne,
+            latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
         )
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
