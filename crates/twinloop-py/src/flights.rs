@@ -165,7 +165,7 @@ pub fn qualities<'py>(
     let draws = noise.as_ref().or(disturbances.as_ref()).map_or(1, |given| given.as_array().shape()[0]);
     if draws == 0 || offsets.as_ref().is_some_and(|offsets| offsets.as_array().nrows() == 0) {
         return Err(misuse(
-            "draws: expected at least one of noise, of offsets and of disturbances, or None, found none".into(),
+            "draws: expected at least one of noise, offsets and disturbances, found none".into(),
         ));
     }
     let noise = optional_blocks("noise", noise, [draws, flights.steps() + 1, n_x])?;
