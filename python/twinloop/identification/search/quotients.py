@@ -30,6 +30,7 @@ from twinloop.identification.terms.denominators import (
     power_of,
     powers_in,
     quotient,
+    states_in,
 )
 from twinloop.signals import Signals
 
@@ -127,34 +128,34 @@ class _Finder:
 
         Plain terms stand in for it where the runs were, and run away elsewhere: so it has to do without those.
         """
+        best = found
         for own in [] if found is None else self._all([found]):
             powers = powers_in(self.pool, own)
-            state, highest = next(iter(powers.items())) if len(powers) == 1 else (None, HIGHEST)
-            if found is None or state is None or len(own) > 1 or highest == HIGHEST:
+            if best is None or len(own) > 1 or not powers:
                 continue
-            split = self._split(found, own)
-            plain_ = tuple(term for term in split.plain if state not in self.pool.leaves(term))
-            if not split.above or plain_ == split.plain:
+            ((state, highest),) = powers.items()
+            split = self._split(best, own)
+            without = tuple(term for term in split.plain if state not in self.pool.leaves(term))
+            if highest == HIGHEST or not split.above or without == split.plain:
                 continue
             longer = (*own, (power_of(self.pool, state, highest + 1), 0.0))
-            again = self._with(known, Quotient(plain_, split.above, longer))
-            if again is not None and shorter(again.description_length, found.description_length):
-                found = again
-        return found
+            again = self._with(known, Quotient(without, split.above, longer))
+            if again is not None and shorter(again.description_length, best.description_length):
+                best = again
+        return best
 
     def _saved(
         self, found: Sum, place: int, known: Sequence[Sum], candidates: Sequence[Sequence[Quotient]]
     ) -> float:
-        """By how much other chains get shorter over a sum's denominator, nats: those whose own are of its state, too.
+        """By how much other chains that ask for alike denominators get shorter over those of a sum, in units of χ².
 
         What one equation pays for a denominator may be too much for it alone: what one substance loses another gains.
         """
         total = 0.0
         for denominator in self._all([found]):
-            states = powers_in(self.pool, denominator).keys()
+            states = states_in(self.pool, denominator)
             for j, (other, own) in enumerate(zip(known, candidates, strict=True)):
-                alike = any(powers_in(self.pool, each.denominator).keys() == states for each in own)
-                if j == place or not alike:
+                if j == place or all(states_in(self.pool, each.denominator) != states for each in own):
                     continue
                 over_it = self._searched(other.chain, denominator, other)
                 total += max(0.0, other.description_length - over_it.description_length)

@@ -57,6 +57,11 @@ def powers_in(pool: Pool, denominator: Denominator) -> dict[int, int]:
     return found
 
 
+def states_in(pool: Pool, denominator: Denominator) -> set[int | None]:
+    """The states that a denominator is made of."""
+    return {leaf for node, _ in denominator for leaf in pool.leaves(node)}
+
+
 def plain(pool: Pool, signals: Signals) -> list[int]:
     """Terms that stand beside quotients: none of those that resemble one where the runs were, as roots do."""
     terms = [pool.one, *coordinates(pool, signals), *quadratic(pool, signals)]
