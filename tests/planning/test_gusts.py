@@ -103,7 +103,7 @@ def integrator():
 
 def test_every_draw_has_its_opposite_and_is_the_same_each_time():
     noise = Noise(np.zeros(1), np.array([KICK]), dt=DT)
-    one, other = (gusts_of(integrator(), noise).drawn(8, STEPS) for _ in range(2))
+    one, other = (gusts_of(integrator(), noise).tuned_in(8, STEPS) for _ in range(2))
     assert one.shape == (8, STEPS, 1) and np.abs(one).min() > 0.0
     assert (one[:4] == -one[4:]).all() and (one == other).all()
 

@@ -90,25 +90,31 @@ class Gusts:
         """What they do to the flights that it was asked of so far."""
         return {}
 
-    def drawn(self, draws: int, steps: int) -> Floats:
-        """What moves the states after each step (draws, n, n_x): half of them drawn, always alike, and their opposites.
+    def tuned_in(self, draws: int, steps: int) -> Floats:
+        """What moves the states after each step while gains are tuned (draws, n, n_x).
+
+        Half of them are drawn, always alike, and the others are their opposites. Those in which a flight is judged are
+        others: gains that are good in some draws must not be judged in the same.
 
         Args:
             draws: an even number of them.
             steps: n of them.
         """
-        if (draws, steps) not in self._drawn:
-            half = self.noise.disturbance(draws // 2, steps, self.unit.stream("repeats"))
-            self._drawn[draws, steps] = np.concatenate([half, -half])
-        return self._drawn[draws, steps]
+        return self._drawn(self.unit.part(0), draws, steps)
+
+    def _drawn(self, unit: Unit, draws: int, steps: int) -> Floats:
+        if (unit, draws, steps) not in self._known:
+            half = self.noise.disturbance(draws // 2, steps, unit.stream("repeats"))
+            self._known[unit, draws, steps] = np.concatenate([half, -half])
+        return self._known[unit, draws, steps]
 
     @cached_property
-    def _drawn(self) -> dict[tuple[int, int], Floats]:
-        """Draws by their number and that of the steps."""
+    def _known(self) -> dict[tuple[Unit, int, int], Floats]:
+        """Draws by their unit, their number and that of the steps."""
         return {}
 
     def _moved(self, test: Test) -> Moved:
-        drawn = self.drawn(DRAWS, test.steps)
+        drawn = self._drawn(self.unit, DRAWS, test.steps)
         if not drawn.any():
             return UNMOVED
         still = np.zeros((1, *drawn.shape[1:]))

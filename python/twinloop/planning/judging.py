@@ -79,7 +79,7 @@ class Committee:
         """
         if self.gusts is None or not self.foretells or draws < 2:
             return None
-        drawn = self.gusts.drawn(draws + draws % 2, steps)[:draws]
+        drawn = self.gusts.tuned_in(draws + draws % 2, steps)[:draws]
         return drawn if drawn.any() else None
 
     def moved_by_gusts(self, test: Test) -> Moved:

@@ -37,18 +37,21 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
-    misses=False, fared=KEPT, in_gusts=None, delayed=None,
+    misses=False, fared=KEPT, in_gusts=None, delayed=None, blown_about=None,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
 
     def judge(
-        members, genes, sds, draws, excitation=None, ends=None, measured=False, off=None, hold_back=None
-    ):
+        members, genes, sds, draws, excitation=None, ends=None, measured=False, off=None, hold_back=None,
+        disturbances=None,
+    ):  # fmt: skip
         if ends is not None:
             return Judged(np.full((1, 4, 1), again), np.zeros((1, 4, 1)))
         values = np.full((1, 4, len(genes)), old)
         values[0, :, 0] = new if recorded is None or not measured else recorded
+        if disturbances is not None:
+            values[0, :, 0] = blown_about
         usages = np.full((1, 4, len(genes)), 0.5)
         usages[0, 0, 0] = usage
         if members == ["delayed"]:
@@ -63,6 +66,7 @@ def chosen(
     planner = SimpleNamespace(
         family=FAMILY, judge=judge, stable_members=lambda members, genes: members,
         options=PlanningOptions(track_record=track_record),
+        gusts=lambda committee, draws: None if blown_about is None else np.ones((draws, 20, 2)),
     )  # fmt: skip
     blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
     late = [] if delayed is None else ["delayed"]
@@ -90,6 +94,11 @@ def test_gains_of_a_twin_that_misses_its_flights_fly_before_they_are_recommended
     # While only the first controller has flown they are recommended, as those of a twin that explains its flights are.
     assert chosen(0.5, misses=True)[0] == "tuned"
     assert chosen(0.5, experiments=[came_true])[0] == "tuned"
+
+
+def test_gains_are_compared_in_the_disturbances_that_they_were_tuned_in():
+    assert chosen(0.5, blown_about=1.5)[0] == "flown"
+    assert chosen(1.5, recorded=0.5, blown_about=0.5)[0] == "tuned"
 
 
 def test_gains_that_are_better_by_more_than_any_miss_are_taken_whatever_predictions_missed():

@@ -68,6 +68,7 @@ class IdentifyAndPlan:
         self.report = report
         self.memory = Memory()
         self.learner = Learner(setup, options, workers, self._watch)
+        self._known_gusts: tuple[Learnt, int, Gusts] | None = None
         self._tests: tuple[int | None, ...] = ()
         task = Task(setup.initial_state, setup.target_state, setup.steps)
         self.planner = Planner(
@@ -322,12 +323,17 @@ class IdentifyAndPlan:
         )
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
-        """Disturbances that are known; none that are known to be a model error."""
+        """Disturbances that are known, drawn once for each lesson; none that are known to be a model error."""
+        known = self._known_gusts
+        if known is not None and known[0] is latest and known[1] == experiments:
+            return known[2]
         setup, lesson = self.setup, latest.lessons[-1]
         errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
         noise = latest.identified.noise(setup.signals).without(errors)
         unit = Unit(setup.seed).part(experiments, 3)
-        return Gusts(latest.identified.model, noise, setup.quality, unit, setup.limits, self.workers)
+        gusts = Gusts(latest.identified.model, noise, setup.quality, unit, setup.limits, self.workers)
+        self._known_gusts = (latest, experiments, gusts)
+        return gusts
 
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
