@@ -134,3 +134,11 @@ def test_gains_are_tuned_for_the_disturbances_that_flights_meet():
     assert gusty == pytest.approx(left.x / DT, rel=0.2)
     # What rests at its target in calm is best left alone.
     assert calm < 0.02
+
+
+def test_disturbances_below_what_sensors_scatter_ask_for_no_other_gains():
+    model, sds = integrator(), np.array([0.1])
+    for kick, counts in ((0.001, False), (0.05, True)):
+        gusts = gusts_of(model, Noise(sds, np.array([kick]), dt=DT))
+        met = Committee([model], sds, True, gusts=gusts, foretells=True).disturbances(8, STEPS)
+        assert (met is not None) == counts
