@@ -93,8 +93,8 @@ class Gusts:
     def tuned_in(self, draws: int, steps: int) -> Floats:
         """What moves the states after each step while gains are tuned (draws, n, n_x).
 
-        Half of them are drawn, always alike, and the others are their opposites. Those in which a flight is judged are
-        others: gains that are good in some draws must not be judged in the same.
+        Half of them are drawn, always alike, and the other half are their opposites. A flight is judged (`on`) in draws
+        of its own: gains that are good in some draws must not be judged in the same.
 
         Args:
             draws: an even number of them.

@@ -80,7 +80,7 @@ class Committee:
         if self.gusts is None or not self.foretells or draws < 2:
             return None
         drawn = self.gusts.tuned_in(draws + draws % 2, steps)[:draws]
-        # What moves no state by as much as its sensor scatters, over a whole flight, asks for no other gains.
+        # Kicks that add up over a flight to less than the sensor scatters, in every state, ask for no other gains.
         walked = np.sqrt(np.square(drawn.cumsum(axis=1)).mean(axis=(0, 1)))
         return drawn if (walked > self.sds).any() else None
 

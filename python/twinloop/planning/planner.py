@@ -102,13 +102,13 @@ class Planner(Judge):
         limiting = [model for model in committee.delayed if model not in committee.tuned_delayed]
 
         # What is wanted is the best mean in the disturbances that flights meet, not in calm.
-        gusts = self.gusts(committee, draws)
+        met = self.disturbances(committee, draws)
 
-        first = float(self.judge(members, starts[0][np.newaxis], sds, draws, disturbances=gusts).mean[0])
+        first = float(self.judge(members, starts[0][np.newaxis], sds, draws, disturbances=met).mean[0])
         unit = first if np.isfinite(first) else 0.0
 
         def score(genes: Floats) -> Floats:
-            judged = self.judge(members, genes, sds, draws, disturbances=gusts)
+            judged = self.judge(members, genes, sds, draws, disturbances=met)
             lasts = judged.finite
             mean = lasts.qualities.sum(axis=(0, 1)) / np.maximum(
                 1, np.isfinite(judged.qualities).sum(axis=(0, 1))
@@ -124,8 +124,8 @@ class Planner(Judge):
             unit=self.unit.part(number), purpose=purpose, watch=lambda: self.watch("gains"),
         )  # fmt: skip
 
-    def gusts(self, committee: Committee, draws: int) -> Floats | None:
-        """Draws of the disturbances in which gains are tuned and compared (draws, n, n_x); None: in calm air."""
+    def disturbances(self, committee: Committee, draws: int) -> Floats | None:
+        """Draws of the disturbances in which gains are tuned and compared (draws, n, n_x); None: in calm."""
         return committee.disturbances(draws, self.task.steps) if self.options.tuned_in_gusts else None
 
     # Proposing

@@ -66,7 +66,7 @@ def chosen(
     planner = SimpleNamespace(
         family=FAMILY, judge=judge, stable_members=lambda members, genes: members,
         options=PlanningOptions(track_record=track_record),
-        gusts=lambda committee, draws: None if blown_about is None else np.ones((draws, 20, 2)),
+        disturbances=lambda committee, draws: None if blown_about is None else np.ones((draws, 20, 2)),
     )  # fmt: skip
     blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
     late = [] if delayed is None else ["delayed"]

@@ -271,10 +271,10 @@ class Choice:
 
     def _in_gusts(self, members: Sequence[_core.Model], genes: Floats, calm: Judged) -> Judged:
         """What members make of gains in known disturbances; what they make of them in calm where there are none."""
-        gusts = self.planner.gusts(self.committee, self.draws)
-        if gusts is None:
+        met = self.planner.disturbances(self.committee, self.draws)
+        if met is None:
             return calm
-        return self.planner.judge(members, genes, self.committee.sds, self.draws, disturbances=gusts)
+        return self.planner.judge(members, genes, self.committee.sds, self.draws, disturbances=met)
 
     def _judge(
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None

@@ -27,8 +27,8 @@ from twinloop.identification.terms.denominators import (
     denominators,
     over,
     plain,
+    power_in,
     power_of,
-    powers_in,
     quotient,
     states_in,
 )
@@ -110,35 +110,38 @@ class _Finder:
         best = list(known)
         for i, quotients in enumerate(candidates):
             for candidate in quotients:
-                found = self._lengthened(known[i], self._with(known[i], candidate))
-                if found is None or not shorter(found.description_length, best[i].description_length):
+                found = self._with(known[i], candidate)
+                if found is None:
+                    continue
+                found = self._lengthened(known[i], found)
+                if not shorter(found.description_length, best[i].description_length):
                     continue
                 rival = self._rival(known[i], found.chain)
-                longest = rival.description_length
-                if not shorter(found.description_length + WORTH, longest):
-                    longest += self._saved(found, i, known, candidates)
-                if shorter(found.description_length + WORTH, longest):
+                to_beat = rival.description_length
+                if not shorter(found.description_length + WORTH, to_beat):
+                    to_beat += self._saved(found, i, known, candidates)
+                if shorter(found.description_length + WORTH, to_beat):
                     best[i] = found
                 elif shorter(rival.description_length, best[i].description_length):
                     best[i] = rival
         return best
 
-    def _lengthened(self, known: Sum, found: Sum | None) -> Sum | None:
+    def _lengthened(self, known: Sum, found: Sum) -> Sum:
         """A sum over a denominator of one power of a state, or the one over the next power too, if that is shorter.
 
         Plain terms stand in for it where the runs were, and run away elsewhere: so it has to do without those.
         """
         best = found
-        for own in [] if found is None else self._all([found]):
-            powers = powers_in(self.pool, own)
-            if best is None or len(own) > 1 or not powers:
+        for own in self._all([found]):
+            alone = power_in(self.pool, own[0][0]) if len(own) == 1 else None
+            if alone is None:
                 continue
-            ((state, highest),) = powers.items()
+            state, power = alone
             split = self._split(best, own)
             without = tuple(term for term in split.plain if state not in self.pool.leaves(term))
-            if highest == HIGHEST or not split.above or without == split.plain:
+            if power == HIGHEST or not split.above or without == split.plain:
                 continue
-            longer = (*own, (power_of(self.pool, state, highest + 1), 0.0))
+            longer = (*own, (power_of(self.pool, state, power + 1), 0.0))
             again = self._with(known, Quotient(without, split.above, longer))
             if again is not None and shorter(again.description_length, best.description_length):
                 best = again

@@ -45,16 +45,13 @@ def power_of(pool: Pool, node: int, power: int) -> int:
     return pool.product(*[node] * power)
 
 
-def powers_in(pool: Pool, denominator: Denominator) -> dict[int, int]:
-    """The highest power of each state that a denominator has alone, by the state; empty where it has other terms."""
-    found: dict[int, int] = {}
-    for node, _ in denominator:
-        leaves = pool.leaves(node)
-        state = leaves[0]
-        if state is None or node != power_of(pool, state, len(leaves)):
-            return {}
-        found[state] = max(found.get(state, 0), len(leaves))
-    return found
+def power_in(pool: Pool, node: int) -> tuple[int, int] | None:
+    """The state and the exponent of a node that is a power of a state; None of all others."""
+    leaves = pool.leaves(node)
+    state = leaves[0]
+    if state is None or node != power_of(pool, state, len(leaves)):
+        return None
+    return state, len(leaves)
 
 
 def states_in(pool: Pool, denominator: Denominator) -> set[int | None]:
