@@ -84,6 +84,12 @@ class Noise(Recorded, kind="noise"):
             self, correlated=tuple(each for each in self.correlated if each.states[0] not in states)
         )
 
+    def calmer(self, states: Collection[int]) -> Noise:
+        """The same without the white disturbances of some states."""
+        return replace(
+            self, moves=np.where(np.isin(np.arange(len(self.moves)), list(states)), 0.0, self.moves)
+        )
+
     def drawn(self, draws: int, steps: int, stream: _core.Stream, reports: Reports) -> tuple[Floats, Floats]:
         """Draws of sensor noise, as it is given (draws, steps + 1, n_x), and of disturbances (draws, steps, n_x)."""
         noise = given(reports, self.sensors * stream.normals(draws, steps + 1, len(self.sensors)))

@@ -18,6 +18,7 @@ from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
 from twinloop.campaign.identify_and_plan.following import WRONG, Following, following, in_pieces
 from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of, of_each_state
+from twinloop.campaign.identify_and_plan.suspects import suspects_of
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
@@ -39,6 +40,7 @@ class Answer:
         believed: members of the committee that follow the flights, the best first; where none explains them, the best
             one of another kind behind it.
         lost: places of the flights that the best of them does not follow.
+        suspects: states that are stirred by a white disturbance which may be what the law is wrong about.
     """
 
     identified: Identified
@@ -49,6 +51,7 @@ class Answer:
     missed: bool
     believed: Sequence[_core.Model]
     lost: Sequence[int] = ()
+    suspects: Sequence[int] = ()
 
     @property
     def worst(self) -> float:
@@ -101,7 +104,8 @@ class Answer:
         missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
         follows = 2 * len(lost) <= len(flights)
-        return Answer(identified, followed, follows, causes, unmoved, missed, believed, lost)
+        suspects = suspects_of(identified, flights, setup.limits, workers) if options.causes else ()
+        return Answer(identified, followed, follows, causes, unmoved, missed, believed, lost, suspects)
 
     def beside(self, other: Answer) -> Answer:
         """The same with the best model of another answer in its committee.
@@ -126,7 +130,7 @@ class Answer:
             return []
         model, noise = self.identified.members[0], self.identified.noise(setup.signals)
         unit = Unit(setup.seed).part(len(flights), 2)
-        return misses_of(model, flights, noise, self.causes, unit, setup.limits, workers)
+        return misses_of(model, flights, noise, self.causes, unit, setup.limits, workers, self.suspects)
 
 
 def _lost(

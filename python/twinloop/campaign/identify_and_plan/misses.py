@@ -34,6 +34,9 @@ FREE_RUN = "free-run"
 RELEVANT = 0.03
 """Misses below this share of how far a flight went do not matter."""
 
+SUSPECT = 0.1
+"""The same of misses that only a white disturbance explains which may be a model error: most laws lack a trace."""
+
 
 @dataclass(frozen=True)
 class Miss:
@@ -67,6 +70,7 @@ def misses_of(
     unit: Unit,
     limits: Limits,
     workers: _core.Workers,
+    suspects: Sequence[int] = (),
 ) -> list[Miss]:
     """States that a model misses, in order; none on a flight whose commands were sent in pulses.
 
@@ -81,18 +85,22 @@ def misses_of(
         unit: of which the draws are a part.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
+        suspects: states that are stirred by a white disturbance which may be a model error.
     """
     lengths = lengths_of(model, flights, limits, workers, noise)
     off, frozen = of_each_state(model, lengths, flights, limits, workers)
     steered = np.array([[run.test is not None] for run in flights])
 
-    def beyond(part: int, *causes_out: Cause) -> Floats:
-        known = noise.without(_caused(causes, *causes_out))
+    def beyond(part: int, told: Noise, *causes_out: Cause) -> Floats:
+        known = told.without(_caused(causes, *causes_out))
         expected = expected_misses(model, lengths, flights, known, unit.part(part), limits, workers)
         return unexplained(off, frozen, expected, steered)
 
-    missed = beyond(0, "law", "undecided")
-    at_least = beyond(1, "law") if "undecided" in causes.values() and missed.any() else missed
+    missed = beyond(0, noise, "law", "undecided")
+    at_least = beyond(1, noise, "law") if "undecided" in causes.values() and missed.any() else missed
+    if suspects:
+        calm = beyond(2, noise.calmer(suspects), "law", "undecided")
+        missed = np.where((missed == 0.0) & (off > SUSPECT * SUSPECT * frozen), calm, missed)
     pulsed = in_pulses([run for run, row in zip(flights, missed, strict=True) if row.any()])
     judged = [j for j, run in enumerate(flights) if run.number not in pulsed]
     with np.errstate(divide="ignore", invalid="ignore"):
