@@ -98,6 +98,10 @@ ABLATIONS: dict[str, Ablation] = {
     "steady": Ablation(
         "a lead that a law found anew needs over the one known before for each term more", {"steady": False}
     ),
+    "lasts": Ablation(
+        "of laws that the readings hardly tell apart, the one that lasts under most controllers",
+        {"lasts": False},
+    ),
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),

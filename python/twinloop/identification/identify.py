@@ -16,6 +16,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
 from twinloop.identification.ages import aged
+from twinloop.identification.alike import Lasting, that_lasts
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import ANEW, by_evidence
 from twinloop.identification.fit.committee import Committee
@@ -105,6 +106,7 @@ def identify_runs(
     watch: Watch = unwatched,
     under_way: UnderWay | None = None,
     keep: Callable[[UnderWay], None] = lambda under_way: None,
+    lasting: Lasting | None = None,
 ) -> Identified:
     """Learns a model and a committee.
 
@@ -123,6 +125,7 @@ def identify_runs(
         watch: called with each step that begins.
         under_way: what was kept of the same identification, from where it goes on; None: it begins.
         keep: called with what there is once the form is known, and after each start and each proposal.
+        lasting: under how many controllers models last; None where nobody can tell.
 
     Returns:
         What was learnt, the same bits wherever it went on from.
@@ -163,8 +166,15 @@ def identify_runs(
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
     known = [found for other in others for found in (other.best, *other.rivals)]
-    found = decided(first, known, ahead=lead(first.best, known) if options.steady else 0.0)
+
+    def owed(one: Hypothesis) -> float:
+        anew = options.steady and not any(one is each for each in known)
+        return lead(one, known) if anew else 0.0
+
+    found = decided(first, known, ahead=owed(first.best))
     context.watch("committee")
+    if lasting is not None and options.lasts:
+        found = replace(found, best=that_lasts(context, found.best, found.rivals, owed, lasting))
     return concluded(context, found, under_way.said)
 
 

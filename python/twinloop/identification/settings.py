@@ -85,10 +85,12 @@ class IdentificationOptions:
             tuned again.
         steady: whether a law found anew must be ahead of the one known before, tuned on all flights, by a margin
             for each term that it has more.
+        lasts: whether of laws that the readings hardly tell apart the one is believed that lasts under most controllers
+            drawn from the box of gains.
         earlier_twin: whether the earlier twin is kept if it follows all flights and the new
             one does not.
-        tame: whether the law known before, tuned on all flights, is kept if the new one diverges under most controllers
-            of the box of gains and follows the flights hardly better.
+        tame: whether the law known before, tuned on all flights, is kept if the new one diverges under more controllers
+            drawn from the box of gains and follows the flights hardly better.
         rough: whether a linear law is learnt beside one that does not explain the flights.
         causes: whether slow disturbances are separated into external ones and model errors; otherwise
             all count as external.
@@ -141,6 +143,7 @@ class IdentificationOptions:
     parts: bool = True
     anew: bool = True
     steady: bool = True
+    lasts: bool = True
     earlier_twin: bool = True
     tame: bool = True
     rough: bool = True

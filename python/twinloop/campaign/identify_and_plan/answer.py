@@ -18,7 +18,7 @@ from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
 from twinloop.campaign.identify_and_plan.following import WRONG, Following, following, in_pieces
 from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of, of_each_state
-from twinloop.campaign.identify_and_plan.suspects import suspects_of
+from twinloop.campaign.identify_and_plan.suspects import stirred, suspects_of
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
@@ -106,6 +106,13 @@ class Answer:
         follows = 2 * len(lost) <= len(flights)
         suspects = suspects_of(identified, flights, setup.limits, workers) if options.causes else ()
         return Answer(identified, followed, follows, causes, unmoved, missed, believed, lost, suspects)
+
+    def beside_more_terms(self) -> Answer:
+        """The same beside a law that describes the flights more briefly: all that disturbs it may be a model error."""
+        causes: dict[int, Cause] = {
+            state: "law" if cause == "law" else "undecided" for state, cause in self.causes.items()
+        }
+        return replace(self, causes=causes, suspects=stirred(self.identified))
 
     def beside(self, other: Answer) -> Answer:
         """The same with the best model of another answer in its committee.

@@ -19,7 +19,7 @@ from twinloop.campaign.identify_and_plan.lessons import lesson_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
 from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from
-from twinloop.campaign.identify_and_plan.tame import TAME, follows_nearly, is_wild
+from twinloop.campaign.identify_and_plan.tame import TAME, Lasting, follows_nearly, is_wilder
 from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
 from twinloop.campaign.identify_and_plan.wrong_readings import without_wrong_readings
 from twinloop.campaign.logbook import Logbook
@@ -102,7 +102,7 @@ class Learner:
         experiments = len(book.experiments)
         needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
         selected = learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
-        identify = self._identification(selected)
+        identify = self._identification(selected, self._drawn(book.experiments, 3))
         flights = without_wrong_readings(book.experiments, self.setup.signals)
         answered = partial(
             Answer.of, flights=flights, setup=self.setup, options=self.options, workers=self.workers
@@ -113,11 +113,9 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
-        if self.options.tame and earlier is not None and self._wild(answer, earlier, flights):
-            again = identify(self.options.as_known, iteration=AGAIN + experiments, earlier=earlier)
-            tame = answered(with_remark(again, TAME), number=4)
-            if follows_nearly(tame, answer) and self._wild(answer, again, flights):
-                answer = tame
+        if self.options.tame and earlier is not None:
+            known_again = partial(identify, self.options.as_known, iteration=AGAIN + experiments)
+            answer = self._or_tame(answer, earlier, known_again, answered, flights)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if self.options.plain != self.options and self._doubted(answer, flights):
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
@@ -154,10 +152,27 @@ class Learner:
         (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights, 0), self.workers)
         return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
 
-    def _wild(self, answer: Answer, known: Identified, flights: Sequence[Experiment]) -> bool:
-        """Whether a law is wild beside the one known before."""
-        unit = self._drawn(flights, 2)
-        return is_wild(answer.identified.model, known.model, self.setup, unit, self.workers)
+    def _or_tame(
+        self,
+        answer: Answer,
+        known: Identified,
+        known_again: Callable[..., Identified],
+        answered: Callable[..., Answer],
+        flights: Sequence[Experiment],
+    ) -> Answer:
+        """An answer, or that of the law known before, tuned on all flights, where it is tamer and follows nearly."""
+        doubted = self._doubted(answer, flights)
+        if not is_wilder(answer.identified, known, self._lasting(answer, known, flights), doubted):
+            return answer
+        again = known_again(earlier=known)
+        tame, lasting = answered(with_remark(again, TAME), number=4), self._lasting(answer, again, flights)
+        wilder = is_wilder(answer.identified, again, lasting, doubted)
+        return tame.beside_more_terms() if wilder and follows_nearly(tame, answer, lasting) else answer
+
+    def _lasting(self, answer: Answer, known: Identified, flights: Sequence[Experiment]) -> Lasting:
+        """Under how many controllers a law lasts, and the one known before."""
+        models = [answer.identified.model, known.model]
+        return Lasting(*lasting_under(models, self.setup, self._drawn(flights, 2), self.workers))
 
     def _drawn(self, flights: Sequence[Experiment], number: int) -> Unit:
         """Of work, from which controllers of the whole box are drawn for one of the looks at them."""
@@ -181,8 +196,13 @@ class Learner:
         lasting = lasting_under(laws, self.setup, self._drawn(flights, 1), self.workers)
         return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
 
-    def _identification(self, selected: Sequence[Selected]) -> partial[Identified]:
-        """Identification of what is learnt from; what it lacks are options and a number."""
+    def _identification(self, selected: Sequence[Selected], unit: Unit) -> partial[Identified]:
+        """Identification of what is learnt from; what it lacks are options and a number.
+
+        Args:
+            selected: what is learnt from.
+            unit: of work, from which controllers are drawn that laws should last under.
+        """
         return partial(
             identify_runs,
             [Run.of(states, commands) for one in selected for states, commands in one.recorded()],
@@ -194,6 +214,7 @@ class Learner:
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,
+            lasting=lambda models: lasting_under(models, self.setup, unit, self.workers),
         )
 
     def _axes(self) -> list[Direction]:

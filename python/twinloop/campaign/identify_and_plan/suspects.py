@@ -38,24 +38,33 @@ def suspects_of(
         workers: how the work is carried out.
     """
     signals = limits.signals
-    stirred = sorted(
-        chain.states[0]
-        for chain in identified.chains
-        if chain.output is not None and chain.motion.white > 0.0
-    )
+    states = stirred(identified)
     latest = flights[-LATEST:]
-    seen = observed(identified, latest, signals, limits, workers) if stirred else None
+    seen = observed(identified, latest, signals, limits, workers) if states else None
     if seen is None:
         return []
     features = [features_of(run.trajectory.states, run.trajectory.commands, signals) for run in latest]
     found = []
-    for state in stirred:
+    for state in states:
         errors = [whitened[1:, state] for whitened, _, _ in seen]
         if is_peaked(np.concatenate(errors)) or foretold(
             list(zip(features, errors, strict=True))
         ).beyond_luck(SURE):
             found.append(state)
     return found
+
+
+def stirred(identified: Identified) -> list[int]:
+    """States that a law drives and a white disturbance stirs, in order.
+
+    Args:
+        identified: with the twin's chains.
+    """
+    return sorted(
+        chain.states[0]
+        for chain in identified.chains
+        if chain.output is not None and chain.motion.white > 0.0
+    )
 
 
 def is_peaked(errors: Floats) -> bool:

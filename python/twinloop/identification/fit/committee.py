@@ -57,14 +57,23 @@ class Committee:
         # The others first: gains are tuned on the first few members, and should suit laws that differ, not draws of
         # one law's constants.
         members = [members[0], *others, *members[1:]]
-        if hypothesis.offsets.any():
-            # What flies them from here on is read as the runs were.
-            members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
-        if context.levels:
-            members = [member.with_levels(context.levels) for member in members]
-        if context.reports:
-            members = [with_reports(member, context.reports) for member in members]
+        members = [as_read(context, hypothesis, member) for member in members]
         self.members, self.observer, self.of_parts = members, observer, bool(others)
+
+
+def as_read(context: Context, hypothesis: Hypothesis, model: _core.Model) -> _core.Model:
+    """A model whose states are read, and whose commands are sent, as those of the runs were.
+
+    Args:
+        context: of the identification.
+        hypothesis: of the model.
+        model: whose states are all read at once.
+    """
+    if hypothesis.offsets.any():
+        model = model.with_offsets(hypothesis.offsets.tolist())
+    if context.levels:
+        model = model.with_levels(context.levels)
+    return with_reports(model, context.reports) if context.reports else model
 
 
 def _structures(
