@@ -20,14 +20,14 @@ Lasting = Callable[[Sequence[_core.Model]], Sequence[int]]
 """Under how many controllers each of several models lasts."""
 
 
-def that_lasts(
+def longer_lasting(
     context: Context,
     best: Hypothesis,
     rivals: Sequence[Hypothesis],
     owed: Callable[[Hypothesis], float],
     lasting: Lasting,
-) -> Hypothesis:
-    """What is believed, or one of its rivals that is hardly less likely and lasts under more controllers.
+) -> Hypothesis | None:
+    """The rival of what is believed that is hardly less likely and lasts under more controllers; None if none does.
 
     Args:
         context: of the identification.
@@ -45,7 +45,8 @@ def that_lasts(
     several = [best, *sorted((one for one in alike if length(one) < most), key=length)]
     models = [as_read(context, one, one.fit.model) for one in several if one.fit is not None]
     if len(models) < max(2, len(several)):
-        return best
+        return None
     counts = lasting(models)
     # The first of those that last longest is the likeliest.
-    return replace(several[counts.index(max(counts))], searches=best.searches)
+    longest = several[counts.index(max(counts))]
+    return None if longest is best else replace(longest, searches=best.searches)

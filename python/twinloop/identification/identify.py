@@ -16,7 +16,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
 from twinloop.identification.ages import aged
-from twinloop.identification.alike import Lasting, that_lasts
+from twinloop.identification.alike import Lasting, longer_lasting
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import ANEW, by_evidence
 from twinloop.identification.fit.committee import Committee
@@ -174,7 +174,8 @@ def identify_runs(
     found = decided(first, known, ahead=owed(first.best))
     context.watch("committee")
     if lasting is not None and options.lasts:
-        found = replace(found, best=that_lasts(context, found.best, found.rivals, owed, lasting))
+        longest = longer_lasting(context, found.best, found.rivals, owed, lasting)
+        found = found if longest is None else replace(found, best=longest)
     return concluded(context, found, under_way.said)
 
 

@@ -115,7 +115,7 @@ class Learner:
             answer = or_known_before(answer, earlier, answered)
         if self.options.tame and earlier is not None:
             known_again = partial(identify, self.options.as_known, iteration=AGAIN + experiments)
-            answer = self._or_tame(answer, earlier, known_again, answered, flights)
+            answer = self._tamer(answer, earlier, known_again, answered, flights) or answer
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if self.options.plain != self.options and self._doubted(answer, flights):
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
@@ -152,22 +152,22 @@ class Learner:
         (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights, 0), self.workers)
         return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
 
-    def _or_tame(
+    def _tamer(
         self,
         answer: Answer,
         known: Identified,
         known_again: Callable[..., Identified],
         answered: Callable[..., Answer],
         flights: Sequence[Experiment],
-    ) -> Answer:
-        """An answer, or that of the law known before, tuned on all flights, where it is tamer and follows nearly."""
+    ) -> Answer | None:
+        """The law known before, tuned on all flights, where it is tamer than that of an answer and follows nearly."""
         doubted = self._doubted(answer, flights)
         if not is_wilder(answer.identified, known, self._lasting(answer, known, flights), doubted):
-            return answer
+            return None
         again = known_again(earlier=known)
         tame, lasting = answered(with_remark(again, TAME), number=4), self._lasting(answer, again, flights)
         wilder = is_wilder(answer.identified, again, lasting, doubted)
-        return tame.beside_more_terms() if wilder and follows_nearly(tame, answer, lasting) else answer
+        return tame.beside_more_terms() if wilder and follows_nearly(tame, answer, lasting) else None
 
     def _lasting(self, answer: Answer, known: Identified, flights: Sequence[Experiment]) -> Lasting:
         """Under how many controllers a law lasts, and the one known before."""
