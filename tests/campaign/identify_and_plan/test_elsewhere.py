@@ -10,7 +10,13 @@ from strategies import program_text
 from twinloop import _core
 from twinloop._ground.steps import unwatched
 from twinloop._ground.streams import Unit
-from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, Elsewhere, elsewhere, lasting_under
+from twinloop.campaign.identify_and_plan.elsewhere import (
+    DRAWN,
+    Elsewhere,
+    drawn_controllers,
+    elsewhere,
+    lasting_under,
+)
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.law.flight import fly
 
@@ -91,7 +97,7 @@ def test_a_law_lasts_under_as_many_of_the_drawn_controllers_as_it_does_one_by_on
     counted = [
         sum(fly(model, test, limits=asked.limits).ended == "completed" for test in tests) for model in laws
     ]
-    assert lasting_under(laws, asked, UNIT, WORKERS) == counted
+    assert lasting_under(laws, asked, drawn_controllers(asked, UNIT), WORKERS) == counted
     assert counted[0] == DRAWN and counted[2] < DRAWN / 2  # both kinds are there
 
 
@@ -113,4 +119,4 @@ def test_a_law_is_doubted_where_a_model_error_may_be_what_explains_it_and_it_is_
     answer = SimpleNamespace(
         explained=explained, believed=[law(damping)], misses=lambda flights, setup, workers: missed
     )
-    assert learner._doubted(answer, [None, None]) is doubted
+    assert learner._doubted(answer, [None, None], drawn_controllers(asked, UNIT)) is doubted

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twinloop import _core
+from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
 from twinloop.campaign.setup import Setup
 from twinloop.law.accuracy import squares
@@ -60,7 +61,7 @@ def elsewhere(
         workers: how the work is carried out.
     """
     known = [] if before is None else [before]
-    runs = _flown([*members, *known], setup, unit, workers)
+    runs = _flown([*members, *known], setup, drawn_controllers(setup, unit), workers)
     first, *others = runs[: len(members)]
     lasts = np.any([run.lasted == setup.steps for run in (first, *others)], axis=0)
     parted = np.array([_part(first, other, setup) for other in others]).reshape(-1, DRAWN)
@@ -70,26 +71,35 @@ def elsewhere(
     return Elsewhere(int(lasts.sum()), int((lasts & apart).sum()), int((lasts & changed).sum()))
 
 
+def drawn_controllers(setup: Setup, unit: Unit) -> Floats:
+    """Genes of controllers that are drawn uniformly from the box of gains (DRAWN, size).
+
+    Args:
+        setup: of the campaign.
+        unit: of work, from which they are drawn.
+    """
+    family = setup.family
+    return family.from_unit(unit.stream("candidates").uniforms(DRAWN, family.size))
+
+
 def lasting_under(
-    models: Sequence[_core.Model], setup: Setup, unit: Unit, workers: _core.Workers
+    models: Sequence[_core.Model], setup: Setup, genes: Floats, workers: _core.Workers
 ) -> list[int]:
-    """Under how many of the drawn controllers each model does not diverge.
+    """Under how many controllers each model does not diverge.
 
     Args:
         models: to be compared.
         setup: of the campaign.
-        unit: of work, from which the controllers are drawn.
+        genes: of the controllers (K, size).
         workers: how the work is carried out.
     """
-    return [int((run.lasted == setup.steps).sum()) for run in _flown(models, setup, unit, workers)]
+    return [int((run.lasted == setup.steps).sum()) for run in _flown(models, setup, genes, workers)]
 
 
 def _flown(
-    models: Sequence[_core.Model], setup: Setup, unit: Unit, workers: _core.Workers
+    models: Sequence[_core.Model], setup: Setup, genes: Floats, workers: _core.Workers
 ) -> list[_core.Runs]:
-    """Runs of each model under the drawn controllers, without noise."""
-    family = setup.family
-    genes = family.from_unit(unit.stream("candidates").uniforms(DRAWN, family.size))
+    """Runs of each model under controllers (K, size), without noise."""
     return [_core.rollout(model, setup.setting, genes, setup.task, workers=workers) for model in models]
 
 

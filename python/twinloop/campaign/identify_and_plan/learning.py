@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from twinloop import _core
+from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
 from twinloop._ground.streams import Unit
 from twinloop.campaign.data.levels import levels_of
 from twinloop.campaign.data.reports import reports_in
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
-from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, lasting_under
+from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, drawn_controllers, lasting_under
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.lessons import lesson_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
@@ -113,11 +114,15 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
+        everywhere = self._drawn(flights, 0)
+        doubted = self._doubted(answer, flights, everywhere)
         if self.options.tame and earlier is not None:
             known_again = partial(identify, self.options.as_known, iteration=AGAIN + experiments)
-            answer = self._tamer(answer, earlier, known_again, answered, flights) or answer
+            tamer = self._tamer(answer, doubted, earlier, known_again, answered, flights)
+            if tamer is not None:
+                answer, doubted = tamer, self._doubted(tamer, flights, everywhere)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
-        if self.options.plain != self.options and self._doubted(answer, flights):
+        if self.options.plain != self.options and doubted:
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
         identified = answer.identified
@@ -141,7 +146,7 @@ class Learner:
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
         )
 
-    def _doubted(self, answer: Answer, flights: Sequence[Experiment]) -> bool:
+    def _doubted(self, answer: Answer, flights: Sequence[Experiment], everywhere: Floats) -> bool:
         """Whether a law does not explain the flights; or only what may be a model error explains them, and it is wild.
 
         Whatever may disturb explains much. A law that needs it, and diverges under most controllers of the box, such as
@@ -149,34 +154,35 @@ class Learner:
         """
         if not answer.explained:
             return True
-        (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights, 0), self.workers)
+        (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
         return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
 
     def _tamer(
         self,
         answer: Answer,
+        doubted: bool,
         known: Identified,
         known_again: Callable[..., Identified],
         answered: Callable[..., Answer],
         flights: Sequence[Experiment],
     ) -> Answer | None:
         """The law known before, tuned on all flights, where it is tamer than that of an answer and follows nearly."""
-        doubted = self._doubted(answer, flights)
-        if not is_wilder(answer.identified, known, self._lasting(answer, known, flights), doubted):
+        everywhere = self._drawn(flights, 2)
+
+        def lasting(other: Identified) -> Lasting:
+            models = [answer.identified.model, other.model]
+            return Lasting(*lasting_under(models, self.setup, everywhere, self.workers))
+
+        if not is_wilder(answer.identified, known, lasting(known), doubted):
             return None
         again = known_again(earlier=known)
-        tame, lasting = answered(with_remark(again, TAME), number=4), self._lasting(answer, again, flights)
-        wilder = is_wilder(answer.identified, again, lasting, doubted)
-        return tame.beside_more_terms() if wilder and follows_nearly(tame, answer, lasting) else None
+        tame, both = answered(with_remark(again, TAME), number=4), lasting(again)
+        wilder = is_wilder(answer.identified, again, both, doubted)
+        return tame.beside_more_terms() if wilder and follows_nearly(tame, answer, both) else None
 
-    def _lasting(self, answer: Answer, known: Identified, flights: Sequence[Experiment]) -> Lasting:
-        """Under how many controllers a law lasts, and the one known before."""
-        models = [answer.identified.model, known.model]
-        return Lasting(*lasting_under(models, self.setup, self._drawn(flights, 2), self.workers))
-
-    def _drawn(self, flights: Sequence[Experiment], number: int) -> Unit:
-        """Of work, from which controllers of the whole box are drawn for one of the looks at them."""
-        return Unit(self.setup.seed).part(len(flights), 4, number)
+    def _drawn(self, flights: Sequence[Experiment], number: int) -> Floats:
+        """Controllers that are drawn from the whole box of gains for one of the looks at them (DRAWN, size)."""
+        return drawn_controllers(self.setup, Unit(self.setup.seed).part(len(flights), 4, number))
 
     def _of_two(
         self,
@@ -196,12 +202,12 @@ class Learner:
         lasting = lasting_under(laws, self.setup, self._drawn(flights, 1), self.workers)
         return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
 
-    def _identification(self, selected: Sequence[Selected], unit: Unit) -> partial[Identified]:
+    def _identification(self, selected: Sequence[Selected], everywhere: Floats) -> partial[Identified]:
         """Identification of what is learnt from; what it lacks are options and a number.
 
         Args:
             selected: what is learnt from.
-            unit: of work, from which controllers are drawn that laws should last under.
+            everywhere: controllers that laws should last under.
         """
         return partial(
             identify_runs,
@@ -214,7 +220,7 @@ class Learner:
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,
-            lasting=lambda models: lasting_under(models, self.setup, unit, self.workers),
+            lasting=lambda models: lasting_under(models, self.setup, everywhere, self.workers),
         )
 
     def _axes(self) -> list[Direction]:
