@@ -76,6 +76,11 @@ def test_what_the_speed_foretells_is_suspected_from_two_flights_on():
     assert suspects_of(identified(), braked[:1], LIMITS, WORKERS) == []
 
 
+def test_a_flight_that_was_told_twice_foretells_nothing_of_itself():
+    (flown,) = flights("always", count=1)
+    assert suspects_of(identified(), [flown, flown], LIMITS, WORKERS) == []
+
+
 def test_where_nothing_stirs_nothing_is_suspected():
     assert suspects_of(identified(white=0.0), flights("moments"), LIMITS, WORKERS) == []
 

@@ -17,6 +17,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.causes import LATEST, PEAKED, SURE, observed
 from twinloop.campaign.identify_and_plan.foretold import features_of, foretold
+from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.identified import Identified
 
 SCATTER = 24.0
@@ -39,7 +40,8 @@ def suspects_of(
     """
     signals = limits.signals
     states = stirred(identified)
-    latest = flights[-LATEST:]
+    # A record that was told twice would foretell its own noise.
+    latest = distinct(flights)[-LATEST:]
     seen = observed(identified, latest, signals, limits, workers) if states else None
     if seen is None:
         return []
