@@ -105,7 +105,7 @@ ABLATIONS: dict[str, Ablation] = {
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),
-    "tame": Ablation("the law known before, tuned again, kept where the new one is wild", {"tame": False}),
+    "tame": Ablation("the law known before, tuned again, kept where the new one is wilder", {"tame": False}),
     "rough": Ablation("a linear law beside one that does not explain the flights", {"rough": False}),
     "causes": Ablation("disturbances separated from model errors", {"causes": False}),
     "exactness": Ablation("the inaccuracy of a law separated from disturbances", {"exactness": False}),

@@ -16,7 +16,7 @@ from twinloop.identification.hypothesis import Hypothesis
 
 HARDLY = 6.0
 """Difference of description lengths up to which evidence is no more than positive (Kass and Raftery 1995)."""
-Lasting = Callable[[Sequence[_core.Model]], Sequence[int]]
+CountLasting = Callable[[Sequence[_core.Model]], Sequence[int]]
 """Under how many controllers each of several models lasts."""
 
 
@@ -25,7 +25,7 @@ def longer_lasting(
     best: Hypothesis,
     rivals: Sequence[Hypothesis],
     owed: Callable[[Hypothesis], float],
-    lasting: Lasting,
+    lasting: CountLasting,
 ) -> Hypothesis | None:
     """The rival of what is believed that is hardly less likely and lasts under more controllers; None if none does.
 
@@ -44,7 +44,8 @@ def longer_lasting(
     most = length(best) + HARDLY
     several = [best, *sorted((one for one in alike if length(one) < most), key=length)]
     models = [as_read(context, one, one.fit.model) for one in several if one.fit is not None]
-    if len(models) < max(2, len(several)):
+    # Of one stage all have a model, or none.
+    if len(models) < 2:
         return None
     counts = lasting(models)
     # The first of those that last longest is the likeliest.

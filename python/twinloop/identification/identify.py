@@ -16,7 +16,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
 from twinloop.identification.ages import aged
-from twinloop.identification.alike import Lasting, longer_lasting
+from twinloop.identification.alike import CountLasting, longer_lasting
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import ANEW, by_evidence
 from twinloop.identification.fit.committee import Committee
@@ -106,7 +106,7 @@ def identify_runs(
     watch: Watch = unwatched,
     under_way: UnderWay | None = None,
     keep: Callable[[UnderWay], None] = lambda under_way: None,
-    lasting: Lasting | None = None,
+    lasting: CountLasting | None = None,
 ) -> Identified:
     """Learns a model and a committee.
 

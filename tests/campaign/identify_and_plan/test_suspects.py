@@ -12,7 +12,7 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.streams import Unit
 from twinloop.campaign.identify_and_plan.misses import misses_of
-from twinloop.campaign.identify_and_plan.suspects import is_peaked, suspects_of
+from twinloop.campaign.identify_and_plan.suspects import comes_at_moments, suspects_of
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.law.noise import Noise
 
@@ -89,12 +89,12 @@ def test_where_nothing_stirs_nothing_is_suspected():
 def test_errors_are_peaked_where_their_kurtosis_is(count):
     random = np.random.default_rng(count)
     normal = [random.standard_normal(count) for _ in range(400)]
-    assert sum(map(is_peaked, normal)) <= 2
+    assert sum(map(comes_at_moments, normal)) <= 2
     # That of uniform ones is 1.8.
-    assert not is_peaked(random.random(count) - 0.5)
+    assert not comes_at_moments(random.random(count) - 0.5)
     for errors in normal[:20]:
         thick = errors * np.where(np.arange(count) % 20 == 0, 20.0, 1.0)
-        assert is_peaked(thick) and stats.kurtosis(thick, fisher=False) > 4.5
+        assert comes_at_moments(thick) and stats.kurtosis(thick, fisher=False) > 4.5
 
 
 def test_a_suspect_explains_nothing_for_certain():

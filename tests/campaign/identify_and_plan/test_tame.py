@@ -70,7 +70,7 @@ def test_all_that_disturbs_a_law_may_be_what_more_terms_describe():
         False,
         [],
     )
-    found = known.beside_more_terms()
+    found = known.with_doubtful_disturbances()
     assert found.causes == {1: "undecided", 2: "law", 3: "undecided"}
     assert list(found.suspects) == [1, 3] and found.explained and not known.suspects
 

@@ -107,8 +107,8 @@ class Answer:
         suspects = suspects_of(identified, flights, setup.limits, workers) if options.causes else ()
         return Answer(identified, followed, follows, causes, unmoved, missed, believed, lost, suspects)
 
-    def beside_more_terms(self) -> Answer:
-        """The same beside a law that describes the flights more briefly: all that disturbs it may be a model error."""
+    def with_doubtful_disturbances(self) -> Answer:
+        """The same where all that disturbs may be a model error, for another law describes the flights more briefly."""
         causes: dict[int, Cause] = {
             state: "law" if cause == "law" else "undecided" for state, cause in self.causes.items()
         }

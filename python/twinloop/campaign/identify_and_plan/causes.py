@@ -256,9 +256,19 @@ def comes_at_moments(flights: Sequence[Floats]) -> bool:
         flights: of each what disturbs it (n,).
     """
     series = np.concatenate([in_pieces(disturbed) for disturbed in flights])
-    about = np.square(series - series.mean())
-    mean = float(about.mean())
-    return bool(np.square(about).mean() > PEAKED * (mean * mean))
+    return is_peaked(series - series.mean(), PEAKED)
+
+
+def is_peaked(series: Floats, most: float) -> bool:
+    """Whether a series (n,) about 0 has few large values among small ones: a kurtosis of more than a given one.
+
+    Args:
+        series: about 0.
+        most: kurtosis; 3 is that of normal values.
+    """
+    squares = np.square(series)
+    mean = float(squares.mean())
+    return bool(np.square(squares).mean() > most * (mean * mean))
 
 
 def acts_in_motion(flights: Sequence[tuple[Floats, Floats]]) -> bool:

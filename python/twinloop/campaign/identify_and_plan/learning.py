@@ -178,7 +178,7 @@ class Learner:
         again = known_again(earlier=known)
         tame, both = answered(with_remark(again, TAME), number=4), lasting(again)
         wilder = is_wilder(answer.identified, again, both, doubted)
-        return tame.beside_more_terms() if wilder and follows_nearly(tame, answer, both) else None
+        return tame.with_doubtful_disturbances() if wilder and follows_nearly(tame, answer, both) else None
 
     def _drawn(self, flights: Sequence[Experiment], number: int) -> Floats:
         """Controllers that are drawn from the whole box of gains for one of the looks at them (DRAWN, size)."""

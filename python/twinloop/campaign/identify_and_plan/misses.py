@@ -98,9 +98,9 @@ def misses_of(
 
     missed = beyond(0, noise, "law", "undecided")
     at_least = beyond(1, noise, "law") if "undecided" in causes.values() and missed.any() else missed
-    if suspects:
-        calm = beyond(2, noise.calmer(suspects), "law", "undecided")
-        missed = np.where((missed == 0.0) & (off > SUSPECT * SUSPECT * frozen), calm, missed)
+    large = (missed == 0.0) & (off > SUSPECT * SUSPECT * frozen)
+    if suspects and large.any():
+        missed = np.where(large, beyond(2, noise.calmer(suspects), "law", "undecided"), missed)
     pulsed = in_pulses([run for run, row in zip(flights, missed, strict=True) if row.any()])
     judged = [j for j, run in enumerate(flights) if run.number not in pulsed]
     with np.errstate(divide="ignore", invalid="ignore"):

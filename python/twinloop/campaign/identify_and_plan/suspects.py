@@ -15,7 +15,7 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.identify_and_plan.causes import LATEST, PEAKED, SURE, observed
+from twinloop.campaign.identify_and_plan.causes import LATEST, PEAKED, SURE, is_peaked, observed
 from twinloop.campaign.identify_and_plan.foretold import features_of, foretold
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.identified import Identified
@@ -49,9 +49,8 @@ def suspects_of(
     found = []
     for state in states:
         errors = [whitened[1:, state] for whitened, _, _ in seen]
-        if is_peaked(np.concatenate(errors)) or foretold(
-            list(zip(features, errors, strict=True))
-        ).beyond_luck(SURE):
+        past = foretold(list(zip(features, errors, strict=True)))
+        if comes_at_moments(np.concatenate(errors)) or past.beyond_luck(SURE):
             found.append(state)
     return found
 
@@ -69,13 +68,10 @@ def stirred(identified: Identified) -> list[int]:
     )
 
 
-def is_peaked(errors: Floats) -> bool:
-    """Whether errors of prediction (n,) are few that are large among small ones: not those of a normal disturbance.
+def comes_at_moments(errors: Floats) -> bool:
+    """Whether few errors of prediction are large among small ones, by more than normal ones may be by luck.
 
     Args:
-        errors: whitened.
+        errors: whitened (n,).
     """
-    squares = np.square(errors)
-    mean = float(squares.mean())
-    most = PEAKED + SURE * float(np.sqrt(SCATTER / len(errors)))
-    return bool(np.square(squares).mean() > most * (mean * mean))
+    return is_peaked(errors, PEAKED + SURE * float(np.sqrt(SCATTER / len(errors))))
