@@ -65,6 +65,7 @@ def tune_gains(
     unit: Unit,
     purpose: Purpose,
     watch: Callable[[], None] = lambda: None,
+    patience: int | None = None,
 ) -> Floats:
     """Genes of the lowest score (Hansen 2016, see `cmaes.rs`).
 
@@ -77,13 +78,16 @@ def tune_gains(
         unit: of which each search is a part.
         purpose: of their random numbers.
         watch: called after every generation.
+        patience: generations after which a search from a further start ends that has found nothing better than those
+            before: most that would go on end where these did. None: it goes on.
     """
     best_genes, best = np.asarray(starts[0], dtype=np.float64), tuple(score(np.atleast_2d(starts[0]))[0])
     for number, start in enumerate(starts):
         mean = np.clip(family.to_unit(start), INSIDE, 1.0 - INSIDE)
         search = _core.CmaEs(mean, spread, OFFSPRING, unit.part(number).named(purpose))
         latest: deque[float] = deque(maxlen=LATEST)
-        for _ in range(max(1, evaluations // (len(starts) * OFFSPRING))):
+        before = best
+        for generation in range(max(1, evaluations // (len(starts) * OFFSPRING))):
             places = search.ask()
             genes = family.from_unit(places)
             lost, scores = score(genes).T
@@ -93,6 +97,8 @@ def tune_gains(
             search = search.tell(places, _ordered(lost, _dearer_outside(scores, places)))
             watch()
             latest.append(float(scores[i]))
+            if number and generation + 1 == patience and best == before:
+                break
             if search.stopped or (not lost.any() and _level([*latest, float(np.median(scores))])):
                 break
     return best_genes

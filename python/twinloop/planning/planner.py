@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,11 +23,29 @@ from twinloop.planning.judging import Committee, Judge, Task
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
 from twinloop.planning.reach import bounds_of
-from twinloop.planning.scored import Scored
+from twinloop.planning.scored import Score, Scored
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.within import tune_within
 
 GOALS = ("both", "model", "control")
+
+
+class Search(NamedTuple):
+    """How gains are searched.
+
+    Args:
+        spread: standard deviation of the first steps, in ranges of the gains.
+        purpose: of its random numbers.
+        patience: generations after which one from a further start ends that has found nothing better than those before.
+    """
+
+    spread: float
+    purpose: Purpose
+    patience: int | None = None
+
+
+COARSE, FINE = Search(0.2, "gains"), Search(0.08, "fine_gains", 16)
+"""From several starts on the best model alone; from the best of them, on several members under drawn noise."""
 
 
 class Planner(Judge):
@@ -81,30 +100,33 @@ class Planner(Judge):
         scored = scored or Scored()
         delayed = list(committee.tuned_delayed)
         first = [*committee.members[:1], *delayed]
-        best = self._searched(committee, first, 1, all_starts, 0.2, number, "gains", scored)
         members = [*committee.members[: max(1, options.tuning_members - len(delayed))], *delayed]
-        fine = [best, starts[0]]
-        return self._searched(committee, members, options.draws, fine, 0.08, number, "fine_gains", scored)
+        known = all_starts[0]
+        coarse = scored(self._score(committee, first, 1, known))
+        best = self._searched(coarse, all_starts, number, COARSE)
+        # Noise and other members may rank basins anew, so what was known is refined, too.
+        fine = scored(self._score(committee, members, options.draws, known))
+        return self._searched(fine, [best, known], number, FINE)
 
-    def _searched(
-        self,
-        committee: Committee,
-        members: Sequence[_core.Model],
-        draws: int,
-        starts: Sequence[Floats],
-        spread: float,
-        number: int,
-        purpose: Purpose,
-        scored: Scored,
-    ) -> Floats:
+    def _searched(self, score: Score, starts: Sequence[Floats], number: int, search: Search) -> Floats:
         """One of two searches, with half of the evaluations."""
+        return tune_gains(
+            self.family, score, starts, evaluations=self.options.evaluations // 2, spread=search.spread,
+            unit=self.unit.part(number), purpose=search.purpose, patience=search.patience,
+            watch=lambda: self.watch("gains"),
+        )  # fmt: skip
+
+    def _score(
+        self, committee: Committee, members: Sequence[_core.Model], draws: int, known: Floats
+    ) -> Score:
+        """The score of genes on members under draws of noise, in units of how well known genes do."""
         options, sds = self.options, committee.sds
         limiting = [model for model in committee.delayed if model not in committee.tuned_delayed]
 
         # What is wanted is the best mean in the disturbances that flights meet, not in calm.
         met = self.disturbances(committee, draws)
 
-        first = float(self.judge(members, starts[0][np.newaxis], sds, draws, disturbances=met).mean[0])
+        first = float(self.judge(members, known[np.newaxis], sds, draws, disturbances=met).mean[0])
         unit = first if np.isfinite(first) else 0.0
 
         def score(genes: Floats) -> Floats:
@@ -119,10 +141,7 @@ class Planner(Judge):
                 lost, usage = lost + delayed.lost, np.maximum(usage, delayed.finite.worst_usage)
             return scores_of(lost, mean, np.maximum(0.0, usage - (1.0 - options.margin)), unit)
 
-        return tune_gains(
-            self.family, scored(score), starts, evaluations=options.evaluations // 2, spread=spread,
-            unit=self.unit.part(number), purpose=purpose, watch=lambda: self.watch("gains"),
-        )  # fmt: skip
+        return score
 
     def disturbances(self, committee: Committee, draws: int) -> Floats | None:
         """Draws of the disturbances in which gains are tuned and compared (draws, n, n_x); None: in calm."""
