@@ -18,7 +18,7 @@ from twinloop.identification.evidence import (
     by_evidence,
     price,
 )
-from twinloop.identification.identify import Found, decided, lead
+from twinloop.identification.searches import Found, decided, lead
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
 LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))

@@ -7,7 +7,8 @@ from sameness import same, through_json
 from small_plants import fans, gravity, pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
-from twinloop.identification.identify import PROPOSALS, UnderWay, identify_runs
+from twinloop.identification.identify import UnderWay, identify_runs
+from twinloop.identification.searches import PROPOSALS
 
 QUICK = {"moves": 1500, "starts": 2, "generations": 1, "population": 20, "committee_size": 4, "tuning_steps": 5,
          "form": "acceleration"}  # fmt: skip

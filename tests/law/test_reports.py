@@ -136,7 +136,7 @@ def test_a_record_with_reports_of_no_machine_is_refused():
     for wrong in (
         "always",
         {"held": held},
-        {"held": [{**held[0], "every": 1}], "computed": computed},
+        {"held": [{**held[0], "every": 0}], "computed": computed},
         {"held": [{**held[0], "first": -1}], "computed": computed},
         {"held": [{**held[0], "age": 2.5}], "computed": computed},
         {"held": [*held, *held], "computed": computed},

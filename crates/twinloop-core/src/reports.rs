@@ -45,7 +45,7 @@ impl Reports {
         let fits = |&(state, report): &(usize, Report)| {
             let of_it = match report {
                 Report::Held { every, first, age } => {
-                    let held = (2..=Self::LONGEST).contains(&every) && (1..=every).contains(&first);
+                    let held = (1..=Self::LONGEST).contains(&every) && (1..=every).contains(&first);
                     held && age <= Self::LONGEST
                 }
                 Report::Computed { of, kept, share } => {
@@ -57,7 +57,7 @@ impl Reports {
         };
         if !reports.iter().all(fits) {
             return invalid(format!(
-                "reports: expected at most one for each of {states} states, held for 2 to {} periods and no older, or computed of \
+                "reports: expected at most one for each of {states} states, held for 1 to {} periods and no older, or computed of \
                  readings of another state that are not computed, with a share above 0 of which less than 1 is kept, \
                  found {reports:?}",
                 Self::LONGEST
@@ -181,7 +181,7 @@ mod tests {
         );
         let wrong = [
             vec![(2, held(2, 1))],
-            vec![(0, held(1, 1))],
+            vec![(0, held(0, 1))],
             vec![(0, held(4, 0))],
             vec![(0, held(4, 5))],
             vec![(0, held(Reports::LONGEST + 1, 1))],

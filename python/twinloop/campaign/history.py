@@ -211,7 +211,7 @@ class Lesson(Recorded, kind="lesson"):
         delays: of each command's actuator, periods; 0 as with `lags`.
         hidden: unmeasured states: which commands or states drive each, whether squared, the mean at rest in units of
             their scale (None: that of the first period), the time constant in s, how it begins, and whether it turns.
-        offsets: delay of each state's readings against those of the driven states, s.
+        offsets: delay of each state's readings against those of the driven states that are read in time, s.
         closed_loop: of the best model, one for each selected test, in units of the states' scales; infinite where it
             diverges.
         normalised: closed_loop over that of the model that never moves.

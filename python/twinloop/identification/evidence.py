@@ -31,6 +31,8 @@ ANEW = 12.0
 The terms of the one were chosen after the last flight, those of the other before: so they have foretold it. And noise
 is not quite what a likelihood takes it for; beyond the flights, laws that few units tell apart differ by much.
 """
+LATENESS = 12.0
+"""What a driven state's sensor that is late must gain: by how many periods it is, and the choice of it."""
 STEPPING = 12.0
 """What a law of a step must gain, increments or one of Euler: it holds for that step alone."""
 

@@ -18,6 +18,7 @@ from twinloop.identification.sensors.noise import KINEMATIC, exact
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.law.reports import late_in, reports_of
 from twinloop.records import Recorded, beside
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -75,6 +76,11 @@ class Identified(Recorded, kind="identified"):
                 " other signals, or is damaged."
             )
         return found
+
+    def late(self, signals: Signals) -> Floats:
+        """Delay of each state's readings against those of the driven states that are read in time (n_x,), s."""
+        ages = late_in(reports_of(self.model, signals.n_x), signals.n_x)
+        return self.offsets + signals.dt * np.array(ages)
 
     @property
     def terms(self) -> int:

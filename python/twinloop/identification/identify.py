@@ -1,15 +1,18 @@
 """Identification: from recorded runs to a model of readable equations and a committee of plausible ones.
 
-It is one search over hypotheses. What outputs mean is decided first. Sensors are aligned; the noise is estimated from
-below and from above, and with it first terms. Then hypotheses are proposed, and evidence decides: lags and delays, a
-hidden state, terms of all rungs and evolved ones with constants that are tuned on predictions, the same on states that
-the model has smoothed, and what parts of the only run have taught. What the search leaves is the committee.
+It is one search over hypotheses, and a second one where sensors may be late. What outputs mean is decided first.
+Sensors are aligned; the noise is estimated from below and from above, and with it first terms. Then hypotheses are
+proposed, and evidence decides: lags and delays, a hidden state, terms of all rungs and evolved ones with constants that
+are tuned on predictions, the same on states that the model has smoothed, and what parts of the only run have taught.
+What the search leaves is the committee.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
@@ -18,57 +21,26 @@ from twinloop._ground.streams import Unit
 from twinloop.identification.ages import aged
 from twinloop.identification.alike import CountLasting, longer_lasting
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import ANEW, by_evidence
 from twinloop.identification.fit.committee import Committee
 from twinloop.identification.forms import likeliest
-from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
+from twinloop.identification.late import Ages, late
 from twinloop.identification.outliers import cleaned
-from twinloop.identification.proposals.apart import apart
-from twinloop.identification.proposals.at_once import at_once
-from twinloop.identification.proposals.bare import bare
-from twinloop.identification.proposals.contacts import contacts
-from twinloop.identification.proposals.friction import friction
-from twinloop.identification.proposals.hidden import hidden
-from twinloop.identification.proposals.lags import lags
-from twinloop.identification.proposals.parts import parts
-from twinloop.identification.proposals.second_look import second_look
-from twinloop.identification.proposals.storage import storage
-from twinloop.identification.proposals.terms import terms
-from twinloop.identification.proposals.undisturbed import undisturbed
 from twinloop.identification.records import Run
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
+from twinloop.identification.searches import Found, Reading, Searches, explored, likelier
 from twinloop.identification.sensors.reported import as_sensed, with_their_noise
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
 from twinloop.identification.terms.directions import Direction
 from twinloop.law.levels import Levels
-from twinloop.law.reports import Held, Reports, old
+from twinloop.law.reports import Held, Reports, late_in, old, reports_of, with_late
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 
-Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
-"""Takes a hypothesis and gives changed ones, or none."""
-PROPOSALS: tuple[Proposal, ...] = (
-    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, second_look, parts, bare, at_once,
-)  # fmt: skip
-"""In the order in which they are made."""
-
-
-@dataclass(frozen=True, eq=False)
-class Found(Recorded, kind="found"):
-    """What a search has found so far.
-
-    Args:
-        best: what is believed.
-        rivals: what else was proposed on the way and lasts on the runs, in order; from other starts, too.
-        made: how many proposals were made.
-    """
-
-    best: Hypothesis
-    rivals: tuple[Hypothesis, ...] = ()
-    made: int = 0
+LATER = 2**30
+"""By how much the number of an iteration is more, in the unit of work in which its readings are taken to be older."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +48,21 @@ class UnderWay(Recorded, kind="identification"):
     """An identification between two proposals; what is left of it is a function of this and of its context.
 
     Args:
-        runs: as they are read, without single readings that are wrong.
+        runs: as they are read if none is late, without single readings that are wrong.
         form: what outputs mean.
         said: remarks on that.
         searches: one for each start that was made, in their order.
-        ages: of readings when they are given (n_x), in periods; none where all are given as they are.
+        ages: of readings of slow sensors when they are given (n_x), in periods; none where all are given as they are.
+        late: by how many periods others may be late (n_x), once where that is known; the runs are learnt with each and
+            then compared. None where none may be late.
     """
 
     runs: tuple[Run, ...]
     form: str
     said: tuple[Remark, ...]
-    searches: tuple[Found, ...] = ()
+    searches: Searches = ()
     ages: tuple[int, ...] = ()
+    late: tuple[Ages, ...] = ()
 
 
 def identify_runs(
@@ -145,80 +120,63 @@ def identify_runs(
         watch=watch,
     )
     if under_way is None:
-        reports = aged(context, logged)
-        context = replace(context, runs=[as_sensed(run, reports, signals) for run in logged])
-        context = cleaned(context) if options.cleaning else context
-        form, said = likeliest(context)
-        ages = tuple(report.age if isinstance(report, Held) else 0 for report in reports)
-        under_way = UnderWay(tuple(context.runs), form, tuple(said), ages=ages)
+        under_way = first_step(context, logged)
         keep(under_way)
     # An earlier version, which began without, knew no ages.
     reports = old(reports, under_way.ages) if under_way.ages else ()
-    context = replace(context, runs=under_way.runs, reports=reports).under(under_way.form)
-    searches = list(under_way.searches)
-    for number, start in enumerate(starts(context, under_way.form)):
-        if number == len(searches):
-            context.watch("noise")
-            searches.append(Found(start()))
-            keep(replace(under_way, searches=tuple(searches)))
-        for propose in PROPOSALS[searches[number].made :] if goes_on(context, searches, number) else ():
-            searches[number] = decided(searches[number], propose(context, searches[number].best))
-            keep(replace(under_way, searches=tuple(searches)))
-    first, *others = searches
-    known = [found for other in others for found in (other.best, *other.rivals)]
+    in_time = replace(context, runs=under_way.runs, reports=reports).under(under_way.form)
+    readings = [read_late(in_time, ages, number) for number, ages in enumerate(under_way.late)] or [in_time]
+    several: list[Reading] = []
+    for reading in readings:
+        before = tuple(found for one in several for found in one.searches)
+        own = under_way.searches[len(before) :]
 
-    def owed(one: Hypothesis) -> float:
-        anew = options.steady and not any(one is each for each in known)
-        return lead(one, known) if anew else 0.0
+        def kept(found: Sequence[Found], so_far: UnderWay = under_way, before: Searches = before) -> None:
+            keep(replace(so_far, searches=(*before, *found)))
 
-    found = decided(first, known, ahead=owed(first.best))
+        # What was known before is no law of readings of other ages: from these nothing but a search anew begins.
+        every = starts(reading, under_way.form)[: 1 if several else None]
+        several.append(Reading(reading, explored(reading, every, own, kept)))
+    best = likelier(several)
+    context, found = best.context, best.found
     context.watch("committee")
     if lasting is not None and options.lasts:
-        longest = longer_lasting(context, found.best, found.rivals, owed, lasting)
+        longest = longer_lasting(context, found.best, found.rivals, best.owed, lasting)
         found = found if longest is None else replace(found, best=longest)
     return concluded(context, found, under_way.said)
 
 
-def goes_on(context: Context, searches: Sequence[Found], number: int) -> bool:
-    """Whether proposals are made from a start: not from a law known before that those found anew are ahead of.
-
-    What is hidden they may have missed, so from such a law they are made in any case. None where only what is known is
-    tuned.
-    """
-    if context.earlier is not None and not context.options.anew:
-        return False
-    own = searches[number].best
-    known = own.fit is not None and not own.actuation.hidden
-    return not (known and any(other.best.evidence > own.evidence for other in searches[:number]))
-
-
-def lead(anew: Hypothesis, known: Sequence[Hypothesis]) -> float:
-    """What a law that was found anew has to be ahead of the one known before by, in units of χ².
-
-    Args:
-        anew: the law.
-        known: what was made of the one known before; none where nothing was known.
-    """
-    if not known:
-        return 0.0
-    return ANEW * max(0, anew.terms - max(known, key=by_evidence).terms)
+def first_step(context: Context, logged: Sequence[Run]) -> UnderWay:
+    """What an identification begins with: how readings are given, without single ones that are wrong, and the form."""
+    signals, earlier = context.signals, context.earlier
+    context = replace(context, reports=aged(context, logged))
+    found, known = late(context, logged), (0,) * signals.n_x
+    if earlier is not None:
+        known = late_in(reports_of(earlier.model, signals.n_x), signals.n_x)
+    context = replace(context, runs=[as_sensed(run, context.reports, signals) for run in logged])
+    context = cleaned(context) if context.options.cleaning else context
+    form, said = likeliest(read_late(context, known))
+    ages = tuple(report.age if isinstance(report, Held) else 0 for report in context.reports)
+    # What more runs say again is believed; what is new is held against what was known, or against readings in time.
+    several = tuple(dict.fromkeys((known, found))) if any((*known, *found)) else ()
+    return UnderWay(tuple(context.runs), form, tuple(said), ages=ages, late=several)
 
 
-def decided(found: Found, proposed: Iterable[Hypothesis], ahead: float = 0.0) -> Found:
-    """What is believed after one more proposal, and its rivals: those that last and are not believed.
+def read_late(context: Context, ages: Ages, number: int = 0) -> Context:
+    """The same with readings that are late by so many periods (n_x).
 
     Args:
-        found: before it.
-        proposed: the hypotheses that it gives.
-        ahead: what the believed one has to be ahead of all of them by, in units of χ².
+        context: with runs as if all were read in time.
+        ages: of the readings.
+        number: of these ages, by which what is drawn under them is told from what is drawn under others.
     """
-    before, several = found.best, [found.best, *proposed]
-    best = max(several, key=lambda one: one.evidence.less(ahead) if one is before else one.evidence)
-    others = (other for other in several[1:] if other is not best and other.evidence.stable)
-    # What is drawn from here on is nothing that one of those that are not believed has drawn.
-    drawn = max(other.searches for other in several if other.start == best.start)
-    rivals = (*found.rivals, *others)
-    return replace(found, best=replace(best, searches=drawn), rivals=rivals, made=found.made + 1)
+    iteration, *within = context.unit.path
+    return replace(
+        context,
+        runs=[as_sensed(run, with_late((), ages), context.signals) for run in context.runs],
+        reports=with_late(context.reports, ages),
+        unit=Unit(context.unit.seed, (iteration + LATER * number, *within)),
+    )
 
 
 def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identified:
@@ -230,7 +188,7 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
     # What parts have entered stays known.
     of_rivals = (rival.pool for rival in found.rivals if rival.of_part)
     pool = max((best.pool, *(pool for pool in of_rivals if pool.extends(best.pool))), key=len)
-    driven = [chain.states[0] for chain in best.driven]
+    driven, ages = [chain.states[0] for chain in best.driven], late_in(context.reports, signals.n_x)
     return Identified(
         model=seated.members[0],
         members=seated.members,
@@ -247,7 +205,7 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
         remarks=[
             *said,
             *remarks(best.runs, pool, signals, sums, fit.chi_squared, fit.readings),
-            *late_sensors(best.offsets, driven, signals),
+            *late_sensors(best.offsets + signals.dt * np.array(ages), driven, signals),
             *other_noise(fit.observer, signals),
             *held_at_bounds(sums, best.candidates.priors.bounds, pool, signals, best.form),
         ],

@@ -94,7 +94,7 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
     """Remarks on sensors that are late or early.
 
     Args:
-        offsets: of each state's readings (n_x,), s.
+        offsets: delay of each state's readings against those of the driven states that are read in time (n_x,), s.
         driven: states that outputs drive.
         signals: of the system.
 
@@ -102,7 +102,7 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
         One an offset.
     """
     names = np.array(signals.state_names)
-    others = ", ".join(names[list(driven)])
+    others = ", ".join(names[[i for i in driven if offsets[i] == 0.0]])
     return [
         note(
             "sensor-offset",

@@ -70,7 +70,8 @@ class IdentificationOptions:
             replaced them.
         hidden: whether a hidden state is searched that commands drive and that decays, such as a climb or heat.
         storage: whether hidden states are searched that measured states drive, such as the twist of a joint.
-        offsets: whether sensors may be late or early against those of the driven states.
+        offsets: whether sensors may be late or early against those of the driven states, and these late
+            against one another.
         reports: whether sensors may be slow, and declared derivatives computed of readings.
         cleaning: whether single wrong readings are ignored before anything is learnt.
         outliers: whether readings far from the predictions of a tuned model are ignored.

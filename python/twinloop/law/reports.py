@@ -16,10 +16,10 @@ from twinloop.signals import Signals
 
 
 class Held(NamedTuple):
-    """A slow sensor, whose last reading is given until there is a new one.
+    """A slow sensor, whose last reading is given until there is a new one, or a late one.
 
     Args:
-        every: periods from one new reading to the next.
+        every: periods from one new reading to the next; 1 where there is a new one in each.
         first: period of the first one after the start of a run, 1 to `every`.
         age: periods that a reading is old when it is given.
     """
@@ -99,6 +99,22 @@ def old(reports: Reports, ages: Sequence[int]) -> Reports:
     )
 
 
+def with_late(reports: Reports, ages: Sequence[int]) -> Reports:
+    """The same in which readings that are given as they are read are late by so many periods (n_x)."""
+    if not any(ages):
+        return reports
+    return tuple(
+        report or (Held(1, 1, age) if age else None)
+        for report, age in zip(reports or (None,) * len(ages), ages, strict=True)
+    )
+
+
+def late_in(reports: Reports, states: int) -> tuple[int, ...]:
+    """Periods by which readings are late that are given in every period (n_x); 0 of all others."""
+    known = reports or (None,) * states
+    return tuple(one.age if isinstance(one, Held) and one.every == 1 else 0 for one in known)
+
+
 def in_words(reports: Reports, signals: Signals) -> list[str]:
     """What is said of each state that is not given as it is read.
 
@@ -109,10 +125,12 @@ def in_words(reports: Reports, signals: Signals) -> list[str]:
     lines, names = [], signals.state_names
     for name, report in zip(names, reports, strict=False):
         if isinstance(report, Held):
-            late = f", and given {report.age * signals.dt:.6g} s later" if report.age else ""
-            lines.append(
-                f"{name} is read once in {report.every} periods ({report.every * signals.dt:.6g} s){late}"
+            late = f"given {report.age * signals.dt:.6g} s later"
+            slow = f"is read once in {report.every} periods ({report.every * signals.dt:.6g} s)"
+            said = [slow] * (report.every > 1) + [f"is {late}" if report.every == 1 else late] * (
+                report.age > 0
             )
+            lines.append(f"{name} {', and '.join(said)}")
         elif isinstance(report, Computed):
             of = names[report.of]
             kept = f"{report.kept:.6g} times its last value and " if report.kept else ""

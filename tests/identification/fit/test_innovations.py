@@ -15,11 +15,11 @@ from twinloop.identification.evidence import CORRELATED
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.innovations import Described
 from twinloop.identification.fit.models import model_of
-from twinloop.identification.identify import PROPOSALS, Found, decided
 from twinloop.identification.records import Run
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import priced
+from twinloop.identification.searches import PROPOSALS, Found, decided
 from twinloop.identification.starts import ANEW, begun, starts
 
 QUICK = {"moves": 2000, "starts": 2, "generations": 2, "population": 30, "committee_size": 4}

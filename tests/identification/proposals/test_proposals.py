@@ -12,13 +12,7 @@ from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
-from twinloop.identification.identify import (
-    PROPOSALS,
-    Found,
-    concluded,
-    decided,
-    identify_runs,
-)
+from twinloop.identification.identify import concluded, identify_runs
 from twinloop.identification.proposals import terms as terms_file
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
@@ -26,6 +20,7 @@ from twinloop.identification.proposals.parts import parts
 from twinloop.identification.proposals.second_look import second_look
 from twinloop.identification.proposals.terms import terms
 from twinloop.identification.search.selection import climbed, from_both_sides
+from twinloop.identification.searches import PROPOSALS, Found, decided
 from twinloop.identification.starts import RENEWED, starts
 
 WORKERS = _core.Workers(1)

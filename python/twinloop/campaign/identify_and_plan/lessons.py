@@ -61,7 +61,7 @@ def lesson_of(
             actuator.rate(command.size) for actuator, command in zip(actuators, signals.commands, strict=True)
         ),
         hidden=identified.actuation.hidden,
-        offsets=tuple(identified.offsets.tolist()),
+        offsets=tuple(identified.late(signals).tolist()),
         closed_loop=tuple(each.error for each in free),
         normalised=tuple(each.normalised for each in free),
         follows=answer.follows,

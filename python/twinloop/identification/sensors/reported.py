@@ -27,14 +27,15 @@ def as_sensed(run: Run, reports: Reports, signals: Signals, ignored: int = 0) ->
         run: as it was logged.
         reports: what is given of readings.
         signals: of the system.
-        ignored: periods after the start whose new readings of slow sensors do not count.
+        ignored: periods after the start whose new readings of sensors that are slow or late do not count.
     """
     if not any(reports):
         return run
     states, weights = run.states.copy(), run.weights.copy()
     for i, report in enumerate(reports):
         if isinstance(report, Held):
-            fresh = np.flatnonzero(np.diff(run.states[:, i])) + 1
+            slow = report.every > 1
+            fresh = (np.flatnonzero(np.diff(run.states[:, i])) if slow else np.arange(len(states) - 1)) + 1
             fresh = np.concatenate([[0], fresh[fresh > max(report.age, ignored)]])
             read = np.maximum(fresh - report.age, 0)
             weights[:, i] = 0.0

@@ -1,0 +1,169 @@
+"""Searches: from each start one proposal after another, and which of what they have found is believed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import ANEW, LATENESS, by_evidence
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.late import unread
+from twinloop.identification.proposals.apart import apart
+from twinloop.identification.proposals.at_once import at_once
+from twinloop.identification.proposals.bare import bare
+from twinloop.identification.proposals.contacts import contacts
+from twinloop.identification.proposals.friction import friction
+from twinloop.identification.proposals.hidden import hidden
+from twinloop.identification.proposals.lags import lags
+from twinloop.identification.proposals.parts import parts
+from twinloop.identification.proposals.second_look import second_look
+from twinloop.identification.proposals.storage import storage
+from twinloop.identification.proposals.terms import terms
+from twinloop.identification.proposals.undisturbed import undisturbed
+from twinloop.law.reports import late_in
+from twinloop.records import Recorded
+
+Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
+"""Takes a hypothesis and gives changed ones, or none."""
+PROPOSALS: tuple[Proposal, ...] = (
+    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, second_look, parts, bare, at_once,
+)  # fmt: skip
+"""In the order in which they are made."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found(Recorded, kind="found"):
+    """What a search has found so far.
+
+    Args:
+        best: what is believed.
+        rivals: what else was proposed on the way and lasts on the runs, in order; from other starts, too.
+        made: how many proposals were made.
+    """
+
+    best: Hypothesis
+    rivals: tuple[Hypothesis, ...] = ()
+    made: int = 0
+
+
+Searches = tuple[Found, ...]
+"""What was found from each start, in their order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What was found of the runs, read in time or later.
+
+    Args:
+        context: with the runs.
+        searches: one for each start, in their order; the first is the search anew.
+    """
+
+    context: Context
+    searches: Searches
+
+    @property
+    def known(self) -> list[Hypothesis]:
+        """What was made of the law known before; none where nothing was known."""
+        return [found for other in self.searches[1:] for found in (other.best, *other.rivals)]
+
+    @property
+    def found(self) -> Found:
+        """What is believed of all searches."""
+        first = self.searches[0]
+        return decided(first, self.known, ahead=self.owed(first.best))
+
+    def owed(self, one: Hypothesis) -> float:
+        """What a hypothesis has to be ahead of what was known before by, in units of χ²."""
+        known = self.known
+        anew = self.context.options.steady and not any(one is each for each in known)
+        return lead(one, known) if anew else 0.0
+
+    def paid(self, one: Hypothesis) -> float:
+        """What late sensors pay under a hypothesis, and what readings would have that are older than their runs."""
+        ages = late_in(self.context.reports, self.context.signals.n_x)
+        observer = one.driven if one.fit is None else one.fit.observer
+        return LATENESS * len(set(ages) - {0}) + unread(self.context, observer)
+
+
+def likelier(several: Sequence[Reading]) -> Reading:
+    """The first reading of the runs, or one of other ages that is ahead of it, with what each age pays."""
+    first, *others = several
+    if not others:
+        return first
+    best = first.found.best
+    for other in others:
+        tried = other.found.best
+        worth = first.owed(tried) + other.paid(tried) - first.paid(best)
+        if tried.evidence.less(worth) > best.evidence:
+            return other
+    return first
+
+
+def explored(
+    context: Context,
+    every: Sequence[Callable[[], Hypothesis]],
+    before: Sequence[Found],
+    kept: Callable[[Sequence[Found]], None],
+) -> Searches:
+    """What is found from each start, one proposal after another.
+
+    Args:
+        context: of the identification.
+        every: starts.
+        before: of these searches, those that were made before; it may go on with others.
+        kept: called with all of these after each start and each proposal.
+    """
+    searches = list(before[: len(every)])
+    for number, start in enumerate(every):
+        if number == len(searches):
+            context.watch("noise")
+            searches.append(Found(start()))
+            kept(searches)
+        for propose in PROPOSALS[searches[number].made :] if goes_on(context, searches, number) else ():
+            searches[number] = decided(searches[number], propose(context, searches[number].best))
+            kept(searches)
+    return tuple(searches)
+
+
+def goes_on(context: Context, searches: Sequence[Found], number: int) -> bool:
+    """Whether proposals are made from a start: not from a law known before that those found anew are ahead of.
+
+    What is hidden they may have missed, so from such a law they are made in any case. None where only what is known is
+    tuned.
+    """
+    if context.earlier is not None and not context.options.anew:
+        return False
+    own = searches[number].best
+    known = own.fit is not None and not own.actuation.hidden
+    return not (known and any(other.best.evidence > own.evidence for other in searches[:number]))
+
+
+def lead(anew: Hypothesis, known: Sequence[Hypothesis]) -> float:
+    """What a law that was found anew has to be ahead of the one known before by, in units of χ².
+
+    Args:
+        anew: the law.
+        known: what was made of the one known before; none where nothing was known.
+    """
+    if not known:
+        return 0.0
+    return ANEW * max(0, anew.terms - max(known, key=by_evidence).terms)
+
+
+def decided(found: Found, proposed: Iterable[Hypothesis], ahead: float = 0.0) -> Found:
+    """What is believed after one more proposal, and its rivals: those that last and are not believed.
+
+    Args:
+        found: before it.
+        proposed: the hypotheses that it gives.
+        ahead: what the believed one has to be ahead of all of them by, in units of χ².
+    """
+    before, several = found.best, [found.best, *proposed]
+    best = max(several, key=lambda one: one.evidence.less(ahead) if one is before else one.evidence)
+    others = (other for other in several[1:] if other is not best and other.evidence.stable)
+    # What is drawn from here on is nothing that one of those that are not believed has drawn.
+    drawn = max(other.searches for other in several if other.start == best.start)
+    rivals = (*found.rivals, *others)
+    return replace(found, best=replace(best, searches=drawn), rivals=rivals, made=found.made + 1)
