@@ -214,6 +214,34 @@ def test_a_search_of_gains_ends_once_more_of_it_would_change_no_score(height):
     assert 2 * 13 * 32 < len(judged) < 2500
 
 
+def test_a_further_search_ends_once_it_is_behind_and_goes_on_where_it_is_ahead():
+    family, judged = family_of(signals()), []
+    # The second basin is the deeper one; a search from the other never meets it.
+    basins = np.array([[0.2, 0.2, 0.2], [0.8, 0.8, 0.8]])
+
+    def score(genes):
+        squares = np.square(family.to_unit(genes)[:, np.newaxis] - basins).sum(axis=2)
+        judged.append(len(genes))
+        return np.stack([np.zeros(len(genes)), (squares + np.array([0.5, 0.1])).min(axis=1)], axis=1)
+
+    def tuned(starts, patience):
+        judged.clear()
+        genes = tune_gains(
+            family, score, [family.from_unit(basins[i] + 0.05) for i in starts], evaluations=20_000, spread=0.02,
+            unit=Unit(1).part(0), purpose="gains", patience=patience,
+        )  # fmt: skip
+        return family.to_unit(genes), len(judged)
+
+    patient, calls = tuned((1, 0), None)
+    genes, fewer = tuned((1, 0), 5)
+    assert same_bits(genes, patient) and fewer < calls
+    # One evaluation of the first start, its whole search, then five generations.
+    alone, whole = tuned((1,), None)
+    assert same_bits(alone, genes) and fewer == whole + 5
+    best, _ = tuned((0, 1), 5)
+    np.testing.assert_allclose(best, basins[1], atol=0.02)
+
+
 def test_what_lies_outside_the_box_is_dearer_the_further_out_whatever_the_scores_are():
     places = np.array([[0.5], [1.0], [1.5], [2.0], [-1.0], [-2.0]])
     for score in (0.0, 1e-200, 3.0, 1e200, -2.0):
