@@ -2,7 +2,7 @@
 
 An analyser, a camera or a receiver of positions tells what was there a while ago. Against its own derivative nothing of
 that shows (`sensors/offsets`); against what drives the state, and what it drives, it does. But a lag may look like it,
-and so may a state that is not logged. So what is found here is a rival: runs are learnt with it and without.
+and so may a state that is not logged. So what is found here is only tried: runs are learnt with it and without.
 """
 
 from __future__ import annotations
