@@ -15,6 +15,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.late import late, unread
 from twinloop.identification.records import Run
+from twinloop.identification.remarks import late_sensors
 from twinloop.identification.sensors.chains import Chain
 from twinloop.law.reports import Held, given, in_words, late_in, old, reports_of, with_late
 
@@ -163,6 +164,11 @@ def test_an_identification_with_a_rival_goes_on_from_every_step_to_the_same_bits
     for step in kept[:: len(kept) // 4]:
         read = UnderWay.from_record(through_json(step.to_record()), SIGNALS)
         assert same(learnt(runs, under_way=read), whole)
+
+
+def test_a_delay_is_said_in_seconds_where_it_is_one_or_more():
+    said = [str(remark) for remark in late_sensors(np.array([0.0, 120.0]), [0, 1], SIGNALS)]
+    assert len(said) == 1 and "Readings of share come 120 s later than those of heat;" in said[0]
 
 
 def test_late_readings_are_said_and_kept_with_what_is_slow():

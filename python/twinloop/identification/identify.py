@@ -24,7 +24,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.committee import Committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.identified import Identified
-from twinloop.identification.late import Ages, late
+from twinloop.identification.late import Ages, known_late, late
 from twinloop.identification.outliers import cleaned
 from twinloop.identification.records import Run
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
@@ -34,7 +34,7 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
 from twinloop.identification.terms.directions import Direction
 from twinloop.law.levels import Levels
-from twinloop.law.reports import Held, Reports, late_in, old, reports_of, with_late
+from twinloop.law.reports import Held, Reports, late_in, old, with_late
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -148,12 +148,9 @@ def identify_runs(
 
 def first_step(context: Context, logged: Sequence[Run]) -> UnderWay:
     """What an identification begins with: how readings are given, without single ones that are wrong, and the form."""
-    signals, earlier = context.signals, context.earlier
     context = replace(context, reports=aged(context, logged))
-    found, known = late(context, logged), (0,) * signals.n_x
-    if earlier is not None:
-        known = late_in(reports_of(earlier.model, signals.n_x), signals.n_x)
-    context = replace(context, runs=[as_sensed(run, context.reports, signals) for run in logged])
+    found, known = late(context, logged), known_late(context)
+    context = replace(context, runs=[as_sensed(run, context.reports, context.signals) for run in logged])
     context = cleaned(context) if context.options.cleaning else context
     form, said = likeliest(read_late(context, known))
     ages = tuple(report.age if isinstance(report, Held) else 0 for report in context.reports)

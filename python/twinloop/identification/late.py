@@ -53,9 +53,8 @@ def late(context: Context, logged: Sequence[Run]) -> Ages:
         None late where one run is all there is, for in that states are functions of time; what was known before once
         lags and offsets are settled, or where nothing is searched anew.
     """
-    n_x, earlier = context.signals.n_x, context.earlier
-    known = late_in(reports_of(earlier.model, n_x), n_x) if earlier is not None else (0,) * n_x
-    if earlier is not None and (context.settled or not context.options.anew):
+    n_x, known = context.signals.n_x, known_late(context)
+    if context.earlier is not None and (context.settled or not context.options.anew):
         return known
     longest = min(LONGEST, int(SHARE * min(len(run.commands) for run in logged)))
     if not (context.options.offsets and context.several) or longest < 1:
@@ -81,6 +80,12 @@ def late(context: Context, logged: Sequence[Run]) -> Ages:
     return tuple(max(0, age - least) for age in ages)
 
 
+def known_late(context: Context) -> Ages:
+    """By how many periods readings were late in what was learnt earlier (n_x); none where nothing was."""
+    n_x, earlier = context.signals.n_x, context.earlier
+    return late_in(() if earlier is None else reports_of(earlier.model, n_x), n_x)
+
+
 def unread(context: Context, observer: Sequence[Chain]) -> float:
     """What the description of readings would have that are older than their runs, and count where none is late.
 
@@ -100,7 +105,13 @@ def unread(context: Context, observer: Sequence[Chain]) -> float:
 
 @dataclass(frozen=True)
 class _Look:
-    """What a short search has made of the runs: how long their description is, and behind which actuators."""
+    """What a short search has made of the runs.
+
+    Args:
+        ages: periods by which states' readings are late, by place; those of others are read in time.
+        length: of the description of the readings.
+        actuation: between commands and what was found.
+    """
 
     ages: Mapping[int, int]
     length: float

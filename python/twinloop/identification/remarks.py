@@ -106,12 +106,16 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
     return [
         note(
             "sensor-offset",
-            f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
+            f"Readings of {', '.join(names[offsets == offset])} come {_duration(abs(offset))}"
             f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is corrected"
             " for it.",
         )
         for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
     ]
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
 def other_noise(observer: Sequence[Chain], signals: Signals) -> list[Remark]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import ANEW, LATENESS, by_evidence
@@ -68,7 +69,7 @@ class Reading:
         """What was made of the law known before; none where nothing was known."""
         return [found for other in self.searches[1:] for found in (other.best, *other.rivals)]
 
-    @property
+    @cached_property
     def found(self) -> Found:
         """What is believed of all searches."""
         first = self.searches[0]
@@ -90,8 +91,6 @@ class Reading:
 def likelier(several: Sequence[Reading]) -> Reading:
     """The first reading of the runs, or one of other ages that is ahead of it, with what each age pays."""
     first, *others = several
-    if not others:
-        return first
     best = first.found.best
     for other in others:
         tried = other.found.best

@@ -126,11 +126,9 @@ def in_words(reports: Reports, signals: Signals) -> list[str]:
     for name, report in zip(names, reports, strict=False):
         if isinstance(report, Held):
             late = f"given {report.age * signals.dt:.6g} s later"
-            slow = f"is read once in {report.every} periods ({report.every * signals.dt:.6g} s)"
-            said = [slow] * (report.every > 1) + [f"is {late}" if report.every == 1 else late] * (
-                report.age > 0
-            )
-            lines.append(f"{name} {', and '.join(said)}")
+            slow = f"read once in {report.every} periods ({report.every * signals.dt:.6g} s)"
+            said = late if report.every == 1 else f"{slow}, and {late}" if report.age else slow
+            lines.append(f"{name} is {said}")
         elif isinstance(report, Computed):
             of = names[report.of]
             kept = f"{report.kept:.6g} times its last value and " if report.kept else ""
