@@ -663,6 +663,8 @@ class Gram:
     @property
     def total(self) -> float:
         """Sum of squares of the whitened readings."""
+    def part(self, features: Sequence[int]) -> Gram:
+        """Of some of the features, in the order given."""
     def with_rows(self, rows: ArrayLike) -> Gram:
         """With more rows (m, p + 1), whitened already: features, and a reading at the end."""
     def with_prior(self, precisions: ArrayLike) -> Gram:

@@ -314,6 +314,7 @@ def calls(world):
         "Regression.log_determinant": (w.regression.log_determinant, motion),
         "Regression.likelihood": (w.regression.likelihood, {"coefficients": w.coefficients, **motion}),
         "Regression.gram": (w.regression.gram, {**motion, "workers": w.workers}),
+        "Gram.part": (w.gram.part, {"features": [w.n_x - 1]}),
         "Gram.with_prior": (w.gram.with_prior, {"precisions": np.ones(w.n_x)}),
         "Gram.with_rows": (w.gram.with_rows, {"rows": np.ones((2, w.n_x + 1))}),
         "Gram.solve": (w.gram.solve, {"subset": [w.n_x - 1], "ridge": 0.0}),

@@ -43,8 +43,9 @@ impl PyRegression {
                 Ok(found)
             };
             let [start, middle, end] = [start, middle, end].map(|values| flat(values, features));
+            let (start, middle, end) = (start?, middle?, end?);
             let (measured, weights) = (flat(measured, states)?, flat(weights, states)?);
-            Ok(Record::new(&chain, measured, weights, &start?, &middle?, &end?)?)
+            Ok(Record::new(&chain, features, measured, weights, [&start, &middle, &end])?)
         };
         let records = records.iter().map(record).collect::<Result<_>>()?;
         Ok(Self(Regression::new(chain, features, records)?))
@@ -147,6 +148,11 @@ impl PyGram {
     #[getter]
     fn total(&self) -> f64 {
         self.0.total()
+    }
+
+    /// Of some of the features.
+    fn part(&self, #[pyo3(from_py_with = given)] features: Vec<usize>) -> Result<Self> {
+        Ok(Self(Arc::new(self.0.part(&features)?)))
     }
 
     /// With more rows: features, and a reading at the end.

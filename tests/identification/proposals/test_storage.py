@@ -16,8 +16,10 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.proposals.storage import shows, storage
+from twinloop.identification.proposals.storage import AT_ONCE, Screen, shows, storage
 from twinloop.identification.records import Run, stages
+from twinloop.identification.search.moderation import precisions
+from twinloop.identification.search.problem import Problem
 from twinloop.identification.starts import starts
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -176,6 +178,33 @@ def test_one_short_run_shows_no_storage_and_neither_do_increments():
         context = Context(runs, JOINT, options, Unit(0), WORKERS)
         start = starts(context, form)[0]()
         assert list(storage(context, fitted(context, start))) == []
+
+
+def test_what_is_tried_beside_others_is_what_is_tried_alone():
+    context = Context([joint(0), joint(1)], JOINT, options_of("default", QUICK), Unit(0), WORKERS)
+    start = fitted(context, starts(context, "acceleration")[0]())
+    several = [
+        (HiddenState((), False, 0.0, time, (1,), settled),)
+        for time in (0.05, 0.2)
+        for settled in (False, True)
+    ]
+    turning = HiddenState((), False, 0.0, 1.0, (0,), False, 0.1)
+    several += [(), (turning, turning), (HiddenState((0,), False, 0.0, 0.2), *several[2])] * 8
+    assert len(several) > AT_ONCE
+    at_once, screen = Screen.of(context, start)(several), Screen.of(context, start)
+    alone = [one for sources in several for one in screen([sources])]
+    assert len({found.evidence.length for found in at_once}) > 3
+    for one, other, sources in zip(at_once, alone, several, strict=True):
+        assert one.actuation.hidden == other.actuation.hidden == sources
+        # As a search of its own has it, with all that its terms are worth.
+        problem = Problem(context, one)
+        for found, twin in zip(one.sums, other.sums, strict=True):
+            assert found.weights == twin.weights and found.description_length == twin.description_length
+            regression = problem.regression(found.chain, problem.values(problem.usable(list(found.weights))))
+            gram = regression.gram(found.chain.sensors, found.chain.motion, WORKERS)
+            prior = precisions(problem, found.chain, list(found.weights))
+            best, _, _ = gram.with_prior(prior).solve(range(len(found.weights)))
+            np.testing.assert_allclose(list(found.weights.values()), best, rtol=1e-6)
 
 
 def test_an_angle_that_wraps_fills_nothing():

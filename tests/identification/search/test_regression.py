@@ -171,6 +171,19 @@ def test_more_rows_are_more_rows():
             gram.with_rows(wrong)
 
 
+def test_a_part_knows_what_its_features_alone_would_tell():
+    gram, _ = problem(1)
+    chosen = [6, 0, 3]
+    part = gram.part(chosen)
+    assert (part.features, part.readings, part.total) == (3, gram.readings, gram.total)
+    for subset in ([0], [2, 1], [0, 1, 2]):
+        expected = gram.solve([chosen[j] for j in subset])
+        for found, known in zip(part.solve(subset), expected, strict=True):
+            np.testing.assert_array_equal(found, known)
+    with pytest.raises(ValueError, match="part: expected features below 8, found 8"):
+        gram.part([0, 8])
+
+
 def test_a_normal_prior_is_a_row_for_each_coefficient_that_reads_0():
     gram, _ = problem(1)
     precisions = np.array([3.0, 0.0, 1e4, 0.5, 2.0, 0.0, 7.0, 1e-3])

@@ -1,5 +1,6 @@
 //! A chain: a state that a sum of features drives, its integral, the integral of that; how they move in a period.
 
+use super::whitening::Linear;
 use crate::error::{Result, invalid};
 use crate::model::Form;
 
@@ -122,33 +123,33 @@ impl Motion {
     /// Predicts the states one period ahead. After them there may be a correlated disturbance that drives them, with its
     /// `correlation` over a period.
     #[inline(always)]
-    pub fn predict(&self, states: &mut [f64], correlation: f64) {
+    pub fn predict<T: Linear>(&self, states: &mut [T], correlation: f64) {
         let (states, hidden) = states.split_at_mut(self.states);
         match self.form {
             Form::Absolute | Form::Increment => {}
             Form::Acceleration => {
                 for i in (1..self.states).rev() {
                     for m in 1..=i {
-                        states[i] += self.powers[m - 1] * states[i - m];
+                        states[i] = states[i] + states[i - m] * self.powers[m - 1];
                     }
                 }
             }
             Form::ExplicitEuler => {
                 for i in (1..self.states).rev() {
-                    states[i] += self.dt * states[i - 1];
+                    states[i] = states[i] + states[i - 1] * self.dt;
                 }
             }
             Form::SemiImplicitEuler => {
                 for i in 1..self.states {
-                    states[i] += self.dt * states[i - 1];
+                    states[i] = states[i] + states[i - 1] * self.dt;
                 }
             }
         }
         if let [gust] = hidden {
             for (state, reach) in states.iter_mut().zip(self.reach) {
-                *state += reach * *gust;
+                *state = *state + *gust * reach;
             }
-            *gust *= correlation;
+            *gust = *gust * correlation;
         }
     }
 }

@@ -6,6 +6,7 @@ use super::chain::{Chain, LONGEST, Motion};
 use super::noise::Noise;
 use super::whitening::Whitening;
 use crate::error::{Result, invalid};
+use crate::lanes::{Isa, Kernel, Vector, dispatch};
 use crate::linear_algebra::Cholesky;
 use crate::workers::Workers;
 
@@ -16,35 +17,42 @@ pub struct Record {
     pub measured: Vec<f64>,
     /// 1 for a reading that counts, 0 for one to be ignored, (n + 1) × states.
     pub weights: Vec<f64>,
-    /// What each feature adds to each state in each period, n × features × states.
+    /// What each feature adds to each state in each period, n × states × [`stride`] of the features; 0 beyond those.
     pub increments: Vec<f64>,
 }
 
+/// Columns that stand in one vector.
+const LANES: usize = 8;
+
+/// Features and the readings behind them, as columns that fill whole vectors.
+pub(crate) fn stride(features: usize) -> usize {
+    (features + 1).next_multiple_of(LANES)
+}
+
 impl Record {
-    /// Readings and the features' values at the start, the middle and the end of each period (n × features each).
+    /// Readings and the values of so many features at the start, the middle and the end of each period (n × features each).
     pub fn new(
         chain: &Chain,
+        features: usize,
         measured: Vec<f64>,
         weights: Vec<f64>,
-        start: &[f64],
-        middle: &[f64],
-        end: &[f64],
+        [start, middle, end]: [&[f64]; 3],
     ) -> Result<Self> {
-        if middle.len() != start.len() || end.len() != start.len() {
-            return invalid(
-                "record: expected as many rows of features at the start, the middle and the end of periods",
-            );
+        let (d, stride) = (chain.states, stride(features));
+        let steps = (measured.len() / d).saturating_sub(1);
+        if [start, middle, end].iter().any(|values| values.len() != steps * features) {
+            return invalid(format!(
+                "record: expected {steps} rows of {features} features at the start, the middle and the end of periods"
+            ));
         }
-        let mut increments = Vec::with_capacity(start.len() * chain.states);
-        for ((&start, &middle), &end) in start.iter().zip(middle).zip(end) {
-            increments.extend_from_slice(&chain.increments(start, middle, end)[..chain.states]);
+        let mut increments = vec![0.0; steps * d * stride];
+        for at in 0..start.len() {
+            let (k, j) = (at / features, at % features);
+            for (i, by) in chain.increments(start[at], middle[at], end[at]).into_iter().take(d).enumerate() {
+                increments[(k * d + i) * stride + j] = by;
+            }
         }
         Ok(Self { measured, weights, increments })
-    }
-
-    /// Periods.
-    pub fn steps(&self, chain: &Chain) -> usize {
-        self.measured.len() / chain.states - 1
     }
 
     /// How far each state may be from 0 before the first reading.
@@ -74,24 +82,17 @@ impl Record {
 
     /// Readings less what given coefficients (features) explain of them, (n + 1) × states.
     pub fn residual(&self, chain: &Chain, coefficients: &[f64]) -> Vec<f64> {
-        // Loops of a known length are faster.
-        match chain.states {
-            1 => self.residual_of::<1>(chain, coefficients),
-            2 => self.residual_of::<2>(chain, coefficients),
-            3 => self.residual_of::<3>(chain, coefficients),
-            _ => self.residual_of::<LONGEST>(chain, coefficients),
-        }
-    }
-
-    fn residual_of<const D: usize>(&self, chain: &Chain, coefficients: &[f64]) -> Vec<f64> {
-        let motion = Motion { states: D, ..chain.motion() };
-        let (increments, _) = self.increments.as_chunks::<D>();
+        let (d, motion, stride) = (chain.states, chain.motion(), stride(coefficients.len()));
+        let weighing: Vec<_> = coefficients.iter().copied().enumerate().filter(|&(_, c)| c != 0.0).collect();
         let mut residual = self.measured.clone();
-        let mut state = [0.0; D];
-        for (k, reading) in residual.as_chunks_mut::<D>().0.iter_mut().skip(1).enumerate() {
-            motion.predict(&mut state, 1.0);
-            for (c, increment) in coefficients.iter().zip(&increments[k * coefficients.len()..]) {
-                state.iter_mut().zip(increment).for_each(|(state, by)| *state += c * by);
+        let mut state = [0.0; LONGEST];
+        let periods = self.increments.chunks_exact(d * stride);
+        for (reading, increments) in residual.chunks_exact_mut(d).skip(1).zip(periods) {
+            motion.predict(&mut state[..d], 1.0);
+            for &(j, c) in &weighing {
+                for (i, state) in state[..d].iter_mut().enumerate() {
+                    *state += c * increments[i * stride + j];
+                }
             }
             reading.iter_mut().zip(state).for_each(|(reading, state)| *reading -= state);
         }
@@ -122,7 +123,7 @@ pub struct Solution {
 }
 
 /// Rows that are multiplied into the products at once.
-const BLOCK: usize = 8;
+const BLOCK: usize = 16;
 
 impl Gram {
     /// Of columns whose inner products are known: with each other (features × features), with what they are to explain,
@@ -144,76 +145,31 @@ impl Gram {
     /// Of all records.
     pub fn new(chain: &Chain, records: &[Record], features: usize, noise: &Noise, workers: &Workers) -> Self {
         let whitenings = Record::whitenings(chain, records, noise);
-        // Loops of a known length are faster.
-        let of_record = match chain.states {
-            1 => Self::of_record::<1>,
-            2 => Self::of_record::<2>,
-            3 => Self::of_record::<3>,
-            _ => Self::of_record::<LONGEST>,
-        };
-        let parts = workers.map(records.len(), |i| of_record(chain, &records[i], features, &whitenings[i]));
+        let parts = workers.map(records.len(), |i| {
+            let of_record =
+                OfRecord { motion: chain.motion(), record: &records[i], features, whitening: &whitenings[i] };
+            dispatch(workers.width(), of_record)
+        });
         let width = features + 1;
         let mut sum = Self { features, products: vec![0.0; width * width], readings: 0 };
-        for part in parts {
-            sum.products.iter_mut().zip(&part.products).for_each(|(a, b)| *a += b);
-            sum.readings += part.readings;
+        for (part, whitening) in parts.iter().zip(&whitenings) {
+            let rows = part.chunks_exact(stride(features)).flat_map(|row| &row[..width]);
+            sum.products.iter_mut().zip(rows).for_each(|(a, b)| *a += b);
+            sum.readings += whitening.readings;
         }
+        sum.mirror();
         sum
-    }
-
-    fn of_record<const D: usize>(
-        chain: &Chain,
-        record: &Record,
-        features: usize,
-        whitening: &Whitening,
-    ) -> Self {
-        let (d, p) = (D, features);
-        let motion = Motion { states: D, ..chain.motion() };
-        let width = p + 1;
-        let mut products = vec![0.0; width * width];
-        let inner = whitening.inner;
-        // The filter's state for each column: the response to each feature, then the prediction of the readings.
-        let mut state = vec![0.0; inner * width];
-        let mut rows: Vec<f64> = Vec::with_capacity(BLOCK * width);
-        let steps = record.steps(chain);
-        for k in 0..=steps {
-            let reading = whitening.reading(k, D);
-            let first = rows.len();
-            rows.resize(first + d * width, 0.0);
-            for j in 0..width {
-                let column = &mut state[j * inner..][..inner];
-                // A feature's own response, or the readings less their prediction.
-                let mut innovation = [0.0; D];
-                for i in 0..d {
-                    innovation[i] = if j < p { column[i] } else { record.measured[k * d + i] - column[i] };
-                }
-                let sign = if j < p { -1.0 } else { 1.0 };
-                let (mut white, mut correction) = ([0.0; D], [0.0; LONGEST + 1]);
-                reading.observe(&innovation, &mut white, &mut correction[..inner]);
-                for i in 0..d {
-                    rows[first + i * width + j] = white[i];
-                }
-                column.iter_mut().zip(&correction).for_each(|(state, by)| *state += sign * by);
-                motion.predict(column, whitening.correlation);
-                if j < p && k < steps {
-                    let increments = &record.increments[(k * p + j) * d..][..d];
-                    column.iter_mut().zip(increments).for_each(|(a, b)| *a += b);
-                }
-            }
-            if rows.len() >= BLOCK * width || k == steps {
-                multiply(&rows, width, &mut products);
-                rows.clear();
-            }
-        }
-        let mut gram = Self { features, products, readings: whitening.readings };
-        gram.mirror();
-        gram
     }
 
     /// With more rows, whitened already: p features and a reading each.
     pub fn with_rows(mut self, rows: &[f64]) -> Self {
         let width = self.features + 1;
-        multiply(rows, width, &mut self.products);
+        for row in rows.chunks_exact(width) {
+            for (i, &factor) in row.iter().enumerate() {
+                let products = &mut self.products[i * width + i..(i + 1) * width];
+                products.iter_mut().zip(&row[i..]).for_each(|(sum, &r)| *sum += factor * r);
+            }
+        }
         self.mirror();
         self.readings += rows.len() / width;
         self
@@ -224,6 +180,16 @@ impl Gram {
         let width = self.features + 1;
         precisions.iter().enumerate().for_each(|(j, precision)| self.products[j * width + j] += precision);
         self
+    }
+
+    /// Of some of the features, in the order given.
+    pub fn part(&self, features: &[usize]) -> Result<Self> {
+        if let Some(other) = features.iter().find(|&&j| j >= self.features) {
+            return invalid(format!("part: expected features below {}, found {other}", self.features));
+        }
+        let chosen = || features.iter().copied().chain([self.features]);
+        let products = chosen().flat_map(|i| chosen().map(move |j| self.product(i, j))).collect();
+        Ok(Self { features: features.len(), products, readings: self.readings })
     }
 
     /// Copies the upper triangle of the products to the lower one.
@@ -295,15 +261,91 @@ impl Gram {
     }
 }
 
-/// Adds the products of rows (each of `width`) to the upper triangle.
-fn multiply(rows: &[f64], width: usize, products: &mut [f64]) {
-    for i in 0..width {
-        let target = &mut products[i * width + i..(i + 1) * width];
-        for row in rows.chunks_exact(width) {
-            let factor = row[i];
-            if factor != 0.0 {
-                target.iter_mut().zip(&row[i..]).for_each(|(t, &r)| *t += factor * r);
+/// The upper triangle of the products of a record's whitened columns, rows of [`stride`] numbers.
+struct OfRecord<'a> {
+    motion: Motion,
+    record: &'a Record,
+    features: usize,
+    whitening: &'a Whitening,
+}
+
+impl Kernel for OfRecord<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<f64> {
+        let Self { motion, record, features, whitening } = self;
+        let (d, inner, stride) = (motion.states, whitening.inner, stride(features));
+        let steps = record.measured.len() / d - 1;
+        let mut products = vec![0.0; (features + 1) * stride];
+        // The filter's state for each column: the response to each feature, then the prediction of the readings, of the
+        // other sign. So its innovation is the state for each, but for the readings, which are added to theirs.
+        let mut state = vec![0.0; inner * stride];
+        let mut measured = vec![0.0; d * stride];
+        let mut rows: Vec<f64> = Vec::with_capacity((BLOCK + d) * stride);
+        for k in 0..=steps {
+            let reading = whitening.reading(k, d);
+            let first = rows.len();
+            rows.resize(first + d * stride, 0.0);
+            for i in 0..d {
+                measured[i * stride + features] = record.measured[k * d + i];
+            }
+            for j in (0..stride).step_by(LANES) {
+                let nothing = W::Of8::splat(0.0);
+                let (mut column, mut correction) = ([nothing; LONGEST + 1], [nothing; LONGEST + 1]);
+                let (mut innovation, mut white) = ([nothing; LONGEST], [nothing; LONGEST]);
+                for m in 0..inner {
+                    column[m] = W::Of8::load(&state[m * stride + j..]);
+                }
+                for i in 0..d {
+                    innovation[i] = column[i] + W::Of8::load(&measured[i * stride + j..]);
+                }
+                reading.observe(&innovation[..d], &mut white[..d], &mut correction[..inner]);
+                for i in 0..d {
+                    white[i].store(&mut rows[first + i * stride + j..]);
+                }
+                for m in 0..inner {
+                    column[m] = column[m] - correction[m];
+                }
+                motion.predict(&mut column[..inner], whitening.correlation);
+                if k < steps {
+                    let moved =
+                        column[..d].iter_mut().zip(record.increments[k * d * stride..].chunks(stride));
+                    for (state, increments) in moved {
+                        *state = *state + W::Of8::load(&increments[j..]);
+                    }
+                }
+                for m in 0..inner {
+                    column[m].store(&mut state[m * stride + j..]);
+                }
+            }
+            if rows.len() >= BLOCK * stride || k == steps {
+                for i in 0..=features {
+                    let mut j = i - i % LANES;
+                    while j < stride {
+                        if stride - j >= W::Of32::LANES {
+                            add::<W::Of32>(&rows, stride, i, j, &mut products);
+                            j += W::Of32::LANES;
+                        } else {
+                            add::<W::Of8>(&rows, stride, i, j, &mut products);
+                            j += LANES;
+                        }
+                    }
+                }
+                rows.clear();
             }
         }
+        products
     }
+}
+
+/// Adds the products of column `i` with those from `j` on, row by row.
+#[inline(always)]
+fn add<V: Vector>(rows: &[f64], stride: usize, i: usize, j: usize, products: &mut [f64]) {
+    let target = &mut products[i * stride + j..][..V::LANES];
+    let mut sum = V::load(target);
+    for row in rows.chunks_exact(stride) {
+        sum = sum + V::load(&row[j..]) * row[i];
+    }
+    sum.store(target);
 }

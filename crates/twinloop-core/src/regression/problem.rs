@@ -1,7 +1,7 @@
 //! A regression: records of one chain and the features that may drive it, checked to fit each other.
 
 use super::chain::Chain;
-use super::gram::{Gram, Record};
+use super::gram::{Gram, Record, stride};
 use super::likelihood::{likelihood, most_likely_noise};
 use super::noise::Noise;
 use crate::error::{Result, invalid};
@@ -24,7 +24,7 @@ impl Regression {
             rows > 0
                 && record.measured.len() == rows * chain.states
                 && record.weights.len() == record.measured.len()
-                && record.increments.len() == (rows - 1) * features * chain.states
+                && record.increments.len() == (rows - 1) * stride(features) * chain.states
         };
         if !records.iter().all(fits) {
             return invalid(format!(

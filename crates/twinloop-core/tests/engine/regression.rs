@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Annealing, Chain, Choices, Form, Gram, Noise, Purpose, Record, Stream, Width, likelihood,
+    Annealing, Chain, Choices, Form, Gram, Noise, Purpose, Record, Stream, Width, Workers, likelihood,
     most_likely_noise, search,
 };
 
@@ -27,7 +27,8 @@ struct Case {
 impl Case {
     fn record(&self) -> Record {
         let [start, middle, end] = &self.features;
-        Record::new(&self.chain, self.measured.clone(), self.weights.clone(), start, middle, end).unwrap()
+        let (measured, weights) = (self.measured.clone(), self.weights.clone());
+        Record::new(&self.chain, FEATURES, measured, weights, [start, middle, end]).unwrap()
     }
 
     fn steps(&self) -> usize {
@@ -236,6 +237,42 @@ proptest! {
                 prop_assert!(near(gram.product(i, j), expected[i][j], scale), "{} {}", gram.product(i, j), expected[i][j]);
             }
         }
+    }
+
+    #[test]
+    fn an_inner_product_is_the_same_beside_any_others(case in case(), features in 4..80_usize, seed in any::<u64>()) {
+        // Columns beyond one vector, and beyond what is multiplied at once.
+        let rows = case.steps();
+        let mut stream = Stream::new(seed, Purpose::Subsets, 0, 0, 0);
+        let columns = [(); 3].map(|()| (0..rows * features).map(|_| stream.gaussian()).collect::<Vec<f64>>());
+        let of = |features: usize, columns: &[Vec<f64>; 3], width: Width| {
+            let [start, middle, end] = columns;
+            let (measured, weights) = (case.measured.clone(), case.weights.clone());
+            let record =
+                Record::new(&case.chain, features, measured, weights, [start, middle, end]).unwrap();
+            Gram::new(&case.chain, &[record], features, &case.noise, &Workers::new(1, width).unwrap())
+        };
+        let all = of(features, &columns, Width::widest());
+        for width in Width::available() {
+            let other = of(features, &columns, width);
+            for i in 0..=features {
+                for j in 0..=features {
+                    prop_assert_eq!(all.product(i, j).to_bits(), other.product(i, j).to_bits());
+                }
+            }
+        }
+        let chosen = [features - 1, 0, features / 2];
+        let few = columns.map(|column| {
+            column.chunks(features).flat_map(|row| chosen.map(|j| row[j])).collect::<Vec<f64>>()
+        });
+        let (alone, part) = (of(3, &few, Width::widest()), all.part(&chosen).unwrap());
+        prop_assert_eq!((part.features, part.readings), (3, all.readings));
+        for i in 0..=3 {
+            for j in 0..=3 {
+                prop_assert_eq!(alone.product(i, j).to_bits(), part.product(i, j).to_bits());
+            }
+        }
+        prop_assert!(all.part(&[features]).is_err());
     }
 
     #[test]

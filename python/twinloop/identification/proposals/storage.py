@@ -8,7 +8,7 @@ shows by linear terms; what it moves is chosen among all terms, as for a hidden 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +26,7 @@ from twinloop.identification.search.hidden import filled, with_hidden, without_h
 from twinloop.identification.search.noise import still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
-from twinloop.identification.search.structure import search
+from twinloop.identification.search.structure import search, search_known, usable_among
 from twinloop.law.actuation import Actuation, HiddenState, alike_commands
 from twinloop.law.forms import DERIVATIVES
 
@@ -48,6 +48,8 @@ STEPS = 4
 """Such factors at most, one after the other."""
 NEAR = 2
 """Single states, the best ones, beside which another source is tried."""
+AT_ONCE = 24
+"""Hidden states of which inner products are computed at once."""
 STORED = 50
 """Number of the unit of work that looks for them."""
 
@@ -105,10 +107,7 @@ def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
     longest = context.signals.dt * max(len(run.commands) for run in screen.hypothesis.runs)
     times = [share * longest for share in TIMES]
     singles = {
-        begins: [
-            max([screen(one) for one in _single(place, begins, times)], key=by_evidence)
-            for place in _sources(context)
-        ]
+        begins: [max(screen(_single(place, begins, times)), key=by_evidence) for place in _sources(context)]
         for begins in (False, True)
     }
     best = [max(pair, key=by_evidence) for pair in zip(*singles.values(), strict=True)]
@@ -117,15 +116,15 @@ def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
     kinds: list[tuple[Screen, list[Hypothesis], Sequence[float]]]
     kinds = [(screen, found, FINER) for found in singles.values()]
     for time in times:
-        pairs = [screen(pair) for one in near for pair in _pairs(context, one, others, time)]
+        pairs = screen(pair for one in near for pair in _pairs(context, one, others, time))
         kinds.append((screen, pairs, ()))
     swings = screen.beside()
     for begins in (False, True):
-        swinging = [
-            swings(pair)
+        swinging = swings(
+            pair
             for place in _sources(context)
             for pair in _swinging(place, begins, longest, context.signals.dt)
-        ]
+        )
         kinds.append((swings, swinging, FINER_SWINGS))
     showing = [
         (of_kind, found, factors)
@@ -154,12 +153,10 @@ def _timed(screen: Screen, best: Hypothesis, factors: Sequence[float]) -> Hypoth
         for _ in range(STEPS):
             hidden = best.actuation.hidden
             by = (1.0 / factor, factor)
-            beside = [screen(tuple(one._replace(time=one.time * share) for one in hidden)) for share in by]
+            beside = [tuple(one._replace(time=one.time * share) for one in hidden) for share in by]
             if all(one.turns for one in hidden):
-                beside += [
-                    screen(tuple(one._replace(turns=one.turns * share) for one in hidden)) for share in by
-                ]
-            found = max([best, *beside], key=by_evidence)
+                beside += [tuple(one._replace(turns=one.turns * share) for one in hidden) for share in by]
+            found = max([best, *screen(beside)], key=by_evidence)
             if found is best:
                 break
             best = found
@@ -220,27 +217,61 @@ class Screen:
     @cached_property
     def without(self) -> Hypothesis:
         """The hypothesis without hidden states, with the best sums of few terms."""
-        return self(())
+        (found,) = self([()])
+        return found
 
     @cached_property
     def plain(self) -> Hypothesis:
         """The same with sums of all terms."""
         return self.with_all_terms(self.without)
 
-    def __call__(self, sources: Sources) -> Hypothesis:
-        """The hypothesis behind some hidden states, with the best sums of few terms."""
-        context, bare = self.context, self.hypothesis
+    def __call__(self, several: Iterable[Sources]) -> list[Hypothesis]:
+        """The hypothesis behind each of several hidden states, or pairs of them, with the best sums of few terms."""
+        every = list(several)
+        parts = (every[first:][:AT_ONCE] for first in range(0, len(every), AT_ONCE))
+        return [found for part in parts for found in self._searched([self._behind(one) for one in part])]
+
+    def _behind(self, sources: Sources) -> tuple[Hypothesis, Problem]:
+        """The hypothesis behind hidden states, and its problem."""
+        bare = self.hypothesis
         tried = replace(bare, actuation=replace(bare.actuation, hidden=sources))
         by_states = all(source.states for source in sources)
-        inputs = self.inputs.storing(sources, context.signals) if by_states else None
-        terms = [*self.terms, *(bare.pool.hidden(number) for number in range(len(sources)))]
-        walks = context.walks(
-            self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
-        )
-        driven = [found.chain for found in bare.sums]
-        problem = Problem(context, tried, inputs, self.problem)
-        sums = search(problem, driven, terms, list(bare.sums), walks, fixed_noise=True)
-        return replace(tried, sums=tuple(sums))
+        inputs = self.inputs.storing(sources, self.context.signals) if by_states else None
+        return tried, Problem(self.context, tried, inputs, self.problem)
+
+    def _searched(self, several: Sequence[tuple[Hypothesis, Problem]]) -> list[Hypothesis]:
+        """Some of what is tried, with its sums.
+
+        They differ in what is hidden alone, so the inner products of all are computed at once.
+        """
+        context, pool, sums = self.context, self.hypothesis.pool, self.hypothesis.sums
+        base = usable_among(self.problem, self.terms, sums)
+        behind = [
+            problem.usable([pool.hidden(number) for number in range(len(one.actuation.hidden))])
+            for one, problem in several
+        ]
+        columns = [self.problem.values(base)]
+        columns += [problem.values(nodes) for (_, problem), nodes in zip(several, behind, strict=True)]
+        all_columns = np.concatenate(columns, axis=2)
+        driven = [found.chain for found in sums]
+        grams = [
+            self.problem.regression(chain, all_columns).gram(
+                chain.sensors, chain.motion, self.problem.workers
+            )
+            for chain in driven
+        ]
+        found, last = [], len(base)
+        for (one, problem), nodes in zip(several, behind, strict=True):
+            own = [*range(len(base)), *range(last, last + len(nodes))]
+            last += len(nodes)
+            walks = context.walks(
+                self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
+            )
+            chosen = search_known(
+                problem, driven, [*base, *nodes], sums, walks, [gram.part(own) for gram in grams]
+            )
+            found.append(replace(one, sums=tuple(chosen)))
+        return found
 
     def with_all_terms(self, found: Hypothesis) -> Hypothesis:
         """A tried hypothesis with sums of all terms of the first rung, and of those of its hidden states."""

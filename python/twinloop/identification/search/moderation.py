@@ -34,8 +34,7 @@ def precisions(problem: Problem, chain: Chain, terms: Sequence[int]) -> Floats:
         chain: that the terms move, with how much it is moved.
         terms: that were found usable.
     """
-    varied = problem.values(terms)[1].var(axis=0) if terms else np.zeros(0)
-    return np.asarray(varied / (TIMES * TIMES * chain.moved))
+    return problem.varied(terms) / (TIMES * TIMES * chain.moved)
 
 
 def with_moved(chain: Chain, runs: Sequence[Run], dt: float) -> Chain:

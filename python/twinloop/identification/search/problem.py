@@ -48,6 +48,7 @@ class Problem:
         self.room = room(signals, self.stages.start[:, : signals.n_x])
         """Bounds of each state within which a denominator must not vanish."""
         self._values: dict[int, Floats] = dict(bare._values) if bare else {}
+        self._varied: dict[int, float] = dict(bare._varied) if bare else {}
         self._feedthrough: dict[tuple[int, int], Floats] = dict(bare._feedthrough) if bare else {}
         self._usable: set[int] = set(bare._usable) if bare else set()
 
@@ -73,6 +74,13 @@ class Problem:
             if terms
             else np.empty((3, len(self.stages.start), 0))
         )
+
+    def varied(self, terms: Sequence[int]) -> Floats:
+        """Variance of terms that were found usable, in the middle of periods (terms,)."""
+        for term in terms:
+            if term not in self._varied:
+                self._varied[term] = float(self._values[term][1].var())
+        return np.array([self._varied[term] for term in terms])
 
     def regression(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Regression:
         """Of one chain on features, once what is known is taken out of its readings.

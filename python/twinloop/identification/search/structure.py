@@ -146,39 +146,56 @@ def search(
     Returns:
         A sum for each chain.
     """
-    usable = problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
+    usable = usable_among(problem, terms, known)
     columns = problem.values(usable)
-    searched = [
-        _Searched(
-            chain,
-            problem.regression(chain, columns),
-            other,
-            prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere, out),
-            precisions(problem, chain, usable),
-        )
-        for chain, other, elsewhere, out in zip(
-            chains, known, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
-        )
-    ]
-    unsettled = searched
+    searched = _posed(problem, chains, usable, known, favoured, forbidden)
+    unsettled = [(one, problem.regression(one.chain, columns)) for one in searched]
     for round_ in range(NOISE_ROUNDS):
-        found = _chosen(problem, usable, unsettled, _walk_of(walks, round_, problem))
-        for one, subsets in zip(unsettled, found, strict=True):
-            one.subsets = subsets
+        for one, regression in unsettled:
+            one.gram = regression.gram(one.chain.sensors, one.chain.motion, problem.workers)
+        _choose(problem, usable, [one for one, _ in unsettled], _walk_of(walks, round_, problem))
         if fixed_noise:
             break
-        before = [one.chain for one in unsettled]
-        noises = _core.most_likely_noises([one.posed(problem) for one in unsettled], problem.workers)
-        for one, (sensors, motion, _) in zip(unsettled, noises, strict=True):
+        before = [one.chain for one, _ in unsettled]
+        noises = _core.most_likely_noises(
+            [one.left(regression, problem) for one, regression in unsettled], problem.workers
+        )
+        for (one, _), (sensors, motion, _) in zip(unsettled, noises, strict=True):
             # Corrected for the degrees of freedom that were used.
             readings, used = problem.readings(one.chain), len(one.subsets[0].features)
             one.chain = one.chain.with_noise(sensors * readings / max(1.0, readings - used), motion)
         # Chains share nothing but their features: one whose noise has settled waits for no other.
         pairs = zip(unsettled, before, strict=True)
-        unsettled = [one for one, chain in pairs if _differ(one.chain, chain, problem)]
+        unsettled = [pair for pair, chain in pairs if _differ(pair[0].chain, chain, problem)]
         if not unsettled:
             break
     return [_sum(problem, usable, one) for one in searched]
+
+
+def search_known(
+    problem: Problem,
+    chains: Sequence[Chain],
+    usable: Sequence[int],
+    known: Sequence[Sum | None],
+    walks: Walks,
+    grams: Sequence[_core.Gram],
+) -> list[Sum]:
+    """The same with noise that is believed, where inner products are known already.
+
+    Args as those of `search`, and:
+        usable: terms to choose from, all usable and those of known sums among them.
+        grams: for each chain, inner products of those terms under its noise.
+    """
+    searched = _posed(problem, chains, usable, known)
+    for one, gram in zip(searched, grams, strict=True):
+        one.gram = gram
+    _choose(problem, usable, searched, _walk_of(walks, 0, problem))
+    return [_sum(problem, usable, one) for one in searched]
+
+
+def usable_among(problem: Problem, terms: Sequence[int], known: Sequence[Sum | None]) -> list[int]:
+    """What is to be chosen from: terms, and those of known sums, as far as they are usable."""
+    return problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
 
 
 @dataclass(eq=False)
@@ -187,30 +204,52 @@ class _Searched:
 
     Args:
         chain: with the noise that the last round has left.
-        regression: of all terms.
         known: a sum to do no worse than, or None.
         costs: of the terms, in units of χ².
         prior: precisions of their coefficients.
         subsets: of the last round, the best first.
+
+    Attributes:
+        gram: inner products under the noise of the round, without the prior.
     """
 
     chain: Chain
-    regression: _core.Regression
     known: Sum | None
     costs: Floats
     prior: Floats
     subsets: list[Judged] = field(default_factory=list)
+    gram: _core.Gram = field(init=False)
 
-    def gram(self, workers: _core.Workers) -> _core.Gram:
-        """Inner products under its noise."""
-        return self.regression.gram(self.chain.sensors, self.chain.motion, workers).with_prior(self.prior)
-
-    def posed(self, problem: Problem) -> tuple[_core.Regression, Floats, Floats, Motion, Floats, Motion]:
+    def left(
+        self, regression: _core.Regression, problem: Problem
+    ) -> tuple[_core.Regression, Floats, Floats, Motion, Floats, Motion]:
         """The noise under which what its best subset leaves is most likely, as a problem for the engine."""
         chain = self.chain
         coefficients = self.subsets[0].spread(len(self.costs))
         floor = floor_of(chain, problem.dt, problem.integration(chain))
-        return self.regression, coefficients, chain.sensors, chain.motion, *floor
+        return regression, coefficients, chain.sensors, chain.motion, *floor
+
+
+def _posed(
+    problem: Problem,
+    chains: Sequence[Chain],
+    usable: Sequence[int],
+    known: Sequence[Sum | None],
+    favoured: Sequence[Mapping[int, float]] = (),
+    forbidden: Sequence[Container[int]] = (),
+) -> list[_Searched]:
+    """What is searched for each chain, among terms that are usable."""
+    return [
+        _Searched(
+            chain,
+            other,
+            prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere, out),
+            precisions(problem, chain, usable),
+        )
+        for chain, other, elsewhere, out in zip(
+            chains, known, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
+        )
+    ]
 
 
 def _walk_of(walks: Walks, round_: int, problem: Problem) -> Walk:
@@ -231,19 +270,18 @@ def _sum(problem: Problem, usable: Sequence[int], searched: _Searched) -> Sum:
         Other(tuple(usable[j] for j in other.features), max(0.0, other.length - best.length))
         for other in behind[: OTHERS - 1]
     ]
-    chain, coefficients = searched.chain, best.spread(len(usable))
-    score = searched.regression.likelihood(coefficients, chain.sensors, chain.motion)
-    score += float((searched.prior * np.square(coefficients)).sum())
+    chain = searched.chain
+    regression = problem.regression(chain, problem.values([usable[j] for j in best.features]))
+    score = regression.likelihood(best.weights, chain.sensors, chain.motion)
+    score += float((searched.prior * np.square(best.spread(len(usable)))).sum())
     rung = RUNG * problem.pool.rung(usable[j] for j in best.features)
     length = rung + score + float(searched.costs[list(best.features)].sum())
     weights = {usable[j]: float(w) for j, w in zip(best.features, best.weights, strict=True)}
     return Sum(weights, length, chain, others)
 
 
-def _chosen(
-    problem: Problem, usable: Sequence[int], searched: Sequence[_Searched], walk: Walk
-) -> list[list[Judged]]:
-    """For each chain what walks find and what was known, the best first; none that predicts a reading by its own noise.
+def _choose(problem: Problem, usable: Sequence[int], searched: Sequence[_Searched], walk: Walk) -> None:
+    """Gives each chain what walks find and what was known, the best first; none predicts a reading by its own noise.
 
     Where a share J of a reading's noise is in the prediction of the same reading, the law leaves (1 − J) of that noise:
     it explains the noise with itself. Runs under one and the same controller offer such laws, for their commands are
@@ -265,14 +303,15 @@ def _chosen(
             ),
         )
 
-    grams = [one.gram(problem.workers) for one in searched]
+    grams = [one.gram.with_prior(one.prior) for one in searched]
     walks = walk(grams, [one.costs for one in searched], 0)
-    chosen = [best(*of_chain) for of_chain in zip(searched, grams, walks, strict=True)]
+    for one, gram, walked in zip(searched, grams, walks, strict=True):
+        one.subsets = best(one, gram, walked)
     for i, (one, gram) in enumerate(zip(searched, grams, strict=True)):
         chain = one.chain
         if (
             chain.form != "acceleration"
-            or _feedthrough(problem, chain, usable, chosen[i][0]) <= MOST_FEEDTHROUGH
+            or _feedthrough(problem, chain, usable, one.subsets[0]) <= MOST_FEEDTHROUGH
         ):
             continue
         rows = problem.feedthrough(chain, usable)
@@ -287,9 +326,8 @@ def _chosen(
                 if _feedthrough(problem, chain, usable, law) <= MOST_FEEDTHROUGH
             ]
             if found:
-                chosen[i] = found
+                one.subsets = found
                 break
-    return chosen
 
 
 def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
