@@ -109,15 +109,26 @@ class Learner:
             Answer.of, flights=flights, setup=self.setup, options=self.options, workers=self.workers
         )
         earlier = None if asked is None else asked.identified
+        begun = under_way
+
+        def kept(so_far: UnderWay) -> None:
+            nonlocal begun
+            begun = so_far
+            keep(so_far)
+
         answer = answered(
-            identify(self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=keep)
+            identify(self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=kept)
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
         everywhere = self._drawn(flights, 0)
         doubted = self._doubted(answer, flights, everywhere)
         if self.options.tame and earlier is not None:
-            known_again = partial(identify, self.options.as_known, iteration=AGAIN + experiments)
+            # Readings that are wrong, late ones and the form are those of the search anew.
+            first_step = None if begun is None else replace(begun, searches=())
+            known_again = partial(
+                identify, self.options.as_known, iteration=AGAIN + experiments, under_way=first_step
+            )
             tamer = self._tamer(answer, doubted, earlier, known_again, answered, flights)
             if tamer is not None:
                 answer, doubted = tamer, self._doubted(tamer, flights, everywhere)
