@@ -6,11 +6,20 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from twinloop import _core
+from twinloop._ground.streams import Unit
+from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
 from twinloop.identification.fit.models import layout
+from twinloop.identification.proposals.contacts import drive
+from twinloop.identification.records import Run
+from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
-from twinloop.identification.terms.hinges import entered, hinges
+from twinloop.identification.starts import starts
+from twinloop.identification.terms.hinges import LIMITS, entered, hinges, limits
 from twinloop.identification.terms.pool import Pool
 
+WORKERS = _core.Workers(2)
 DT = 0.02
 RAIL = tl.Signals(
     [tl.State("position", "m", 1.0), tl.State("velocity", "m/s", 3.0, derivative_of="position")],
@@ -129,6 +138,116 @@ def test_a_limited_power_is_found():
     error = free_run_error(twin, on_the_road, (6.0,), driven(3), road)
     assert error < 1e-4
     assert error < 0.1 * free_run_error(without, on_the_road, (6.0,), driven(3), road)
+
+
+SERVO = tl.Signals([tl.State("angle", "rad", 1.0)], [tl.Command("asked", "1", (-1.2, 1.2))], DT)
+PUSHED_BALL = tl.Signals(
+    [*SERVO.states, tl.State("place", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="place")],
+    SERVO.commands,
+    DT,
+)
+
+
+def turning(x, u):
+    """It turns 5 rad/s at most."""
+    return np.array([np.clip((u - x[0]) / 0.06, -5.0, 5.0)])
+
+
+def pushing_a_ball(x, u):
+    return np.array([*turning(x, u), x[2], 3.0 * x[0] - 0.3 * x[2]])
+
+
+@pytest.mark.parametrize(
+    ("signals", "plant", "noise"),
+    [(SERVO, turning, [2e-3]), (PUSHED_BALL, pushing_a_ball, [2e-3, 1e-3, 5e-3])],
+)
+def test_a_servo_that_turns_only_so_fast_is_found(signals, plant, noise):
+    start = (0.0,) * signals.n_x
+    for seed in (0, 10):
+        runs = [
+            flown(plant, start, pushed(1.0, seed + i, held=15), signals, noise, seed + i) for i in range(2)
+        ]
+
+        twin = tl.identify(runs, signals, seed=0)
+        without = tl.identify(runs, signals, seed=0, options={"contacts": False})
+
+        unseen = pushed(1.0, 99, held=15)
+        error = free_run_error(twin, plant, start, unseen, signals)
+        assert error < 1e-5
+        assert error < 0.02 * free_run_error(without, plant, start, unseen, signals)
+
+
+def accelerating(x, u):
+    """It follows six times its command by 3 m/s² at most, which it does most of the time."""
+    return np.array([np.clip(2.0 * (6.0 * u - x[0]), -3.0, 3.0)])
+
+
+def opening(x, u):
+    """A valve that opens three times as fast as it closes."""
+    return np.array([np.clip(8.0 * (u - x[0]), -0.5, 1.5)])
+
+
+@pytest.mark.parametrize(("plant", "proportion"), [(turning, 1.2), (accelerating, 7.2), (opening, 1.2)])
+def test_in_which_proportion_inputs_drive_through_a_limit_shows_where_they_drive_least(plant, proportion):
+    run = flown(plant, (0.0,), pushed(1.0, 0, steps=300, held=25), SERVO, [1e-3], 0)
+    context = Context([Run.of(run.states, run.commands)], SERVO, options_of("default", {}), Unit(0), WORKERS)
+    start = starts(context, "acceleration")[0]()
+    problem, chain = Problem(context, start), start.driven[0]
+    regression = problem.regression(chain, problem.values(problem.usable([0, 1])))
+    everywhere, _, _ = regression.gram(chain.sensors, chain.motion, WORKERS).solve([0, 1])
+    found = drive(problem, chain, [0, 1])
+    # A command of 1.2 is 1 for a model.
+    assert found[1] / found[0] == pytest.approx(-proportion, rel=0.05)
+    assert abs(found[1] / found[0] + proportion) < 0.5 * abs(everywhere[1] / everywhere[0] + proportion)
+
+
+VALVE = tl.Signals(
+    [tl.State("flow", "l/s", 1.0), tl.State("level", "m", 1.0)], [tl.Command("valve", "%", (0.0, 100.0))], DT
+)
+
+
+def filling(x, u):
+    """A valve that opens three times as fast as it closes fills a tank."""
+    return np.array([np.clip(8.0 * (0.02 * u - x[0]), -0.5, 1.5), 0.5 * x[0] - 0.4 * np.sqrt(x[1])])
+
+
+@pytest.mark.parametrize(
+    ("plant", "signals", "start", "middle", "most", "noise"),
+    [
+        (accelerating, SERVO, (0.0,), 0.0, 1.0, [1e-2]),
+        (filling, VALVE, (1.0, 1.0), 50.0, 45.0, [3e-3, 3e-3]),
+    ],
+)
+def test_what_is_limited_most_of_the_time_or_to_one_side_more_is_found(
+    plant, signals, start, middle, most, noise
+):
+    runs = [
+        flown(plant, start, middle + pushed(most, i, steps=200, held=25), signals, noise, i) for i in range(2)
+    ]
+    twin = tl.identify(runs, signals, seed=0)
+    without = tl.identify(runs, signals, seed=0, options={"contacts": False})
+    unseen = middle + pushed(most, 99, steps=200, held=25)
+    error = free_run_error(twin, plant, start, unseen, signals)
+    assert error < 1e-4
+    assert error < 0.01 * free_run_error(without, plant, start, unseen, signals)
+
+
+def test_hinges_of_a_drive_do_not_depend_on_units_and_leave_out_what_hardly_counts():
+    inputs = np.random.default_rng(0).normal(size=(200, 3))
+    values = []
+    for factor in (1.0, 2.0**9):
+        pool, seen = Pool(3), inputs * [factor, 1.0, 1.0]
+        found = limits([{0: -3.0 / factor, 1: 0.01, 2: 5.0}, {1: 7.0, 2: 0.1}], seen)
+        terms = [entered(pool, hinge, 100) for hinge in found]
+        assert all(set(pool.leaves(term)) <= {0, 2, None} for term in terms) and len(set(terms)) == 4 * LIMITS
+        values.append(pool.values(terms, seen))
+    np.testing.assert_array_equal(*values)
+    driven = -3.0 * inputs[:, 0] + 5.0 * inputs[:, 2]
+    for hinge, column in zip(found, values[0].T, strict=True):
+        place = hinge.place * np.abs(driven).max()
+        above, below = np.maximum(0.0, driven - place), np.maximum(0.0, -driven - place)
+        expected = above if hinge.side else above - below
+        np.testing.assert_allclose(column * np.abs(driven).max(), expected, atol=1e-12)
 
 
 def test_a_linear_plant_has_no_hinge():

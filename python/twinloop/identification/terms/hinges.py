@@ -2,13 +2,15 @@
 
 A stop pushes once it is touched, a gear turns its load once the play is used up, a valve lets nothing through before it
 is a little open. No polynomial says so. A hinge max(0, z - c) does (Friedman 1991), and times the rate of z it is what
-a contact loses (Hunt and Crossley 1975). At a speed v a motor of limited power gives u - max(0, u v - c) / v.
+a contact loses (Hunt and Crossley 1975). At a speed v a motor of limited power gives u - max(0, u v - c) / v. A servo
+that turns only so fast follows z = k (u - x) by z - max(0, z - c) + max(0, -z - c).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial, reduce
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +23,12 @@ from twinloop.signals import Signals
 
 PLACES = 16
 """Places that are tried between the least and the largest value of a coordinate, and as many among its readings."""
+LIMITS = 6
+"""Places that are tried between the least and the largest of what drives a chain, and as many among its values."""
+PROPORTION = 5.0
+"""Nats that a hinge of a drive must gain for each of its weights, which were estimated."""
+NEGLIGIBLE = 0.02
+"""Share of what the strongest input of a drive moves that another one has to move to count."""
 MOST = 400
 """Hinges that are tried; where there would be more, fewer places are."""
 SLOW = 0.05
@@ -34,21 +42,27 @@ class Hinge:
     """A place of a coordinate z at which something begins.
 
     Args:
-        inputs: the input that z is, or two of which z is the difference.
-        scale: that z is in units of.
+        inputs: those that z is a weighted sum of.
+        weights: theirs.
         rates: the inputs that are the derivatives of those; none where there are none, or the term is without them.
         side: 1 if it grows above the place, -1 below it, 0 on both sides of 0 alike.
-        place: c, in units of the scale.
+        place: c.
         over: a state and its scale that z is the input times, and the term is over: what a limited power takes from the
             input; None: there is none.
     """
 
     inputs: tuple[int, ...]
-    scale: float
+    weights: tuple[float, ...]
     rates: tuple[int, ...]
     side: int
     place: float = 0.0
     over: tuple[int, float] | None = None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether z is an input or the difference of two: its weights are units, and were not estimated."""
+        first, *others = self.weights
+        return not others or others == [-first]
 
 
 def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
@@ -68,12 +82,31 @@ def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
     count = min(PLACES, MOST // (2 * max(1, len(kinds))))
     found = []
     for kind in kinds:
-        first, *second = (inputs[:, i] for i in kind.inputs)
-        values = (first - second[0] if second else first) / kind.scale
+        values = (inputs[:, list(kind.inputs)] * kind.weights).sum(axis=1)
         if kind.over is not None:
             values = values * (inputs[:, kind.over[0]] / kind.over[1])
         places = _places(values if kind.side else np.abs(values), count)
         found += [replace(kind, place=place) for place in places]
+    return found
+
+
+def limits(drives: Iterable[Mapping[int, float]], inputs: Floats) -> list[Hinge]:
+    """Hinges where what drives a chain may be limited, to both sides alike and to one.
+
+    Args:
+        drives: coefficients of two inputs or more that drive a chain together.
+        inputs: of the model (rows, inputs).
+    """
+    found = []
+    for weights in drives:
+        moved = {i: abs(weight) * float(inputs[:, i].std()) for i, weight in weights.items()}
+        counting = tuple(i for i in weights if moved[i] > NEGLIGIBLE * max(moved.values()))
+        values = (inputs[:, list(counting)] * [weights[i] for i in counting]).sum(axis=1)
+        largest = float(np.abs(values).max())
+        for side in (0, 1) if len(counting) > 1 else ():
+            kind = Hinge(counting, tuple(weights[i] / largest for i in counting), (), side)
+            places = _places((values if side else np.abs(values)) / largest, LIMITS)
+            found += [replace(kind, place=place) for place in places]
     return found
 
 
@@ -85,8 +118,7 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
         hinge: of the same inputs.
         tried: hinges that it is chosen from.
     """
-    first, *second = hinge.inputs
-    coordinate = pool.share(pool.add("-", first, second[0]) if second else first, hinge.scale)
+    coordinate = _coordinate(pool, hinge)
     speed = None if hinge.over is None else pool.share(*hinge.over)
     if speed is not None:
         coordinate = pool.product(coordinate, speed)
@@ -102,8 +134,21 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
         force = pool.product(depth, pool.add("-", first, second[0]) if second else first)
     if speed is not None:
         force = pool.add("/", force, speed)
-    pool.found.setdefault(force, WORTH + float(log(tried)))
+    of_drive = PROPORTION * len(hinge.inputs) * (not hinge.is_plain)
+    pool.found.setdefault(force, WORTH + float(log(tried)) + of_drive)
     return force
+
+
+def _coordinate(pool: Pool, hinge: Hinge) -> int:
+    """The node of z; where it is no input and no difference of two, its weights are constants that may be tuned."""
+    if hinge.is_plain:
+        single = len(hinge.inputs) == 1
+        return pool.share(hinge.inputs[0] if single else pool.add("-", *hinge.inputs), 1.0 / hinge.weights[0])
+    parts = [
+        pool.product(pool.constant(weight), each)
+        for weight, each in zip(hinge.weights, hinge.inputs, strict=True)
+    ]
+    return reduce(partial(pool.add, "+"), parts)
 
 
 def _keeps_away_from_zero(values: Floats) -> bool:
@@ -128,13 +173,14 @@ def _kinds(signals: Signals, positive: Sequence[int]) -> Iterator[Hinge]:
         own = tuple(of[name] for name in names) if all(name in of for name in names) else ()
         for side in sides:
             for moved in dict.fromkeys(((), own)):
-                yield Hinge(inputs, states[inputs[0]].scale, moved, side)
+                weight = 1.0 / states[inputs[0]].scale
+                yield Hinge(inputs, (weight, -weight)[: len(inputs)], moved, side)
     for place, command in enumerate(signals.commands, signals.n_x):
         for side in (0,) if command.bounds[0] < 0.0 < command.bounds[1] else (1, -1):
-            yield Hinge((place,), 1.0, (), side)
+            yield Hinge((place,), (1.0,), (), side)
         for state in positive:
             for side in (1, -1) if state not in periodic(signals) else ():
-                yield Hinge((place,), 1.0, (), side, over=(state, states[state].scale))
+                yield Hinge((place,), (1.0,), (), side, over=(state, states[state].scale))
 
 
 def _places(values: Floats, count: int) -> list[float]:
