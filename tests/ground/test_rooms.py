@@ -39,7 +39,7 @@ FRONTS = {
         "apart at_once bare contacts friction hidden lags parts second_look storage terms undisturbed"
     ),
     "identification/search": (
-        "behind_a_law directions hidden moderation noise problem selection structure walks"
+        "behind_a_law directions drives hidden moderation noise problem selection structure walks"
     ),
     "identification/sensors": "chains euler_steps noise offsets reported",
     "identification/terms": (

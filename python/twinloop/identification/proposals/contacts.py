@@ -1,25 +1,18 @@
-"""Contacts: what begins at a place, as the force of a stop does, where terms leave more than noise.
-
-What drives a chain may be limited, such as a servo that turns only so fast. Through any such limit a regression still
-sees roughly in which proportion inputs drive it (Bussgang 1952), and better where they drive it less.
-"""
+"""Contacts: what begins at a place, as the force of a stop does, where terms leave more than noise."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.noise import RIDGE, first_noise, still
+from twinloop.identification.search.drives import drive
+from twinloop.identification.search.noise import first_noise, still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, entered, hinges, limits
 from twinloop.identification.terms.libraries import periodic
@@ -27,12 +20,6 @@ from twinloop.law.actuation import Actuation
 
 NEAR = 10.0
 """Units of χ² by which a subset may be worse than the best whose hinges are looked at more closely."""
-
-
-WITHIN = (0.8, 0.65, 0.5, 0.35, 0.25, 0.18, 0.13)
-"""Shares of the periods, in which inputs drive a chain least, by which their coefficients are estimated in turn."""
-BENDS = tuple(share / 10.0 for share in range(1, 10))
-"""Shares of the periods below the places at which what drives a chain may be bent."""
 
 
 def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -79,63 +66,6 @@ def _drives(context: Context, hypothesis: Hypothesis, problem: Problem) -> Itera
         driving = [i for i in inputs if i in sum_.weights or i in chain.states]
         if len(driving) > 1:
             yield drive(problem, chain, driving)
-
-
-def drive(problem: Problem, chain: Chain, inputs: Sequence[int]) -> dict[int, float]:
-    """Coefficients of inputs that drive a chain together through a limit, where there is one, up to a factor.
-
-    They are estimated in turn where they drive it less and less; those are taken by whose sum, bent at any places, the
-    chain is described best: of few periods there is more noise in them, of many more of the limit.
-
-    Args:
-        problem: of the chain.
-        chain: that is driven.
-        inputs: at least two that were found usable.
-    """
-
-    def solved(*features: Floats) -> tuple[Floats, float]:
-        columns = np.concatenate(features, axis=2)
-        gram = problem.regression(chain, columns).gram(chain.sensors, chain.motion, problem.workers)
-        answer = gram.solve(range(columns.shape[2]), RIDGE)
-        return (np.zeros(columns.shape[2]), np.inf) if answer is None else (answer[0], answer[2])
-
-    columns = problem.values([*problem.usable([problem.pool.one]), *inputs])
-    found, least = np.ones(len(inputs)), np.inf
-    for driven in (None, *_followed(columns[:, :, 1:], inputs, chain)):
-        for share in WITHIN:
-            within = np.ones(1) if driven is None else _least(driven, share)
-            coefficients, _ = solved(*(columns * part for part in (within, 1.0 - within) if part.any()))
-            coefficients = coefficients[: columns.shape[2]]
-            driven = (columns * coefficients).sum(axis=2)
-            bent = np.maximum(0.0, driven[:, :, np.newaxis] - np.quantile(driven, BENDS))
-            _, left = solved(columns, bent)
-            if left < least:
-                found, least = coefficients[1:], left
-    return dict(zip(inputs, found.tolist(), strict=True))
-
-
-def _least(driven: Floats, share: float) -> Floats:
-    """1 in such a share of the periods, in which a chain is driven least, 0 in others (3, rows, 1)."""
-    size = np.abs(driven)
-    calm: Floats = (size <= np.quantile(size, share))[:, :, np.newaxis].astype(float)
-    return calm
-
-
-def _followed(columns: Floats, inputs: Sequence[int], chain: Chain) -> Iterator[Floats]:
-    """How far the last state of a chain is from the input that it resembles most, both by their spreads (3, rows).
-
-    A state that follows a command is hardly driven where it has come near. None where it resembles no other.
-    """
-    own = [place for place, i in enumerate(inputs) if i in chain.states]
-    spread = columns[0].std(axis=0)
-    others = [place for place in range(len(inputs)) if place not in own and spread[place] > 0.0]
-    if not own or not others or not spread[own[-1]] > 0.0:
-        return
-    standard = (columns - columns[0].mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
-    state = standard[:, :, max(own, key=lambda place: chain.states.index(inputs[place]))]
-    alike = [float((state[0] * standard[0, :, place]).mean()) for place in others]
-    nearest = max(range(len(others)), key=lambda number: abs(alike[number]))
-    yield state - np.sign(alike[nearest]) * standard[:, :, others[nearest]]
 
 
 def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) -> list[Hinge]:
