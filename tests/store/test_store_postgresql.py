@@ -34,6 +34,7 @@ from sameness import same
 from twinloop.faces.cli import main
 from twinloop.logs import write_columns
 from twinloop.store import listed, opened
+from twinloop.store.lock import AdvisoryLock
 
 needed("psycopg", "the driver psycopg is not installed")
 if not (shutil.which("initdb") and shutil.which("pg_ctl")):
@@ -117,6 +118,36 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):
     campaign.close()
     other.close()
     tl.Campaign.load(address, "one").close()
+
+
+def test_a_lock_that_was_released_is_free_before_the_server_notices_that_its_connection_has_ended(server):
+    engine = create_engine(server)
+
+    class Lingering:
+        """A connection that lives on where it is ended."""
+
+        def __init__(self):
+            self.connection = engine.connect()
+            self.execute, self.commit = self.connection.execute, self.connection.commit
+
+        def invalidate(self):
+            pass
+
+        close = invalidate
+
+    first = Lingering()
+    lock = AdvisoryLock(first, 7, "it")
+    with pytest.raises(tl.errors.StoreFailure, match="found another one"):
+        AdvisoryLock(engine.connect(), 7, "it")
+    lock.release()
+    again = AdvisoryLock(engine.connect(), 7, "it")
+    again.release()
+    first.connection.close()
+    # One whose connection the server has ended is released, too.
+    gone = AdvisoryLock(engine.connect(), 7, "it")
+    gone._connection.connection.dbapi_connection.close()
+    gone.release()
+    engine.dispose()
 
 
 def test_a_writer_whose_lock_the_server_has_ended_writes_no_more_once_another_one_does(server, pendulum):

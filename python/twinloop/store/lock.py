@@ -76,16 +76,22 @@ class AdvisoryLock:
     def __init__(self, connection: Any, number: int, what: str) -> None:
         from sqlalchemy import text
 
-        self._connection = connection
+        self._connection, self._key = connection, {"key": self.KEY, "number": number}
         asked = text("select pg_try_advisory_lock(:key, :number)")
-        if not connection.execute(asked, {"key": self.KEY, "number": number}).scalar():
+        if not connection.execute(asked, self._key).scalar():
             connection.close()
             raise taken(what, "another one")
         connection.commit()
 
     def release(self) -> None:
         """Lets others write."""
-        # Closed for good: a pool would keep the connection, and with it the lock.
+        from sqlalchemy import text
+        from sqlalchemy.exc import SQLAlchemyError
+
+        # The server notices the end of a connection in its own time. Where it has ended before, so has the lock.
+        with contextlib.suppress(SQLAlchemyError):
+            self._connection.execute(text("select pg_advisory_unlock(:key, :number)"), self._key)
+        # Closed for good: a pool would keep the connection.
         self._connection.invalidate()
         self._connection.close()
 
