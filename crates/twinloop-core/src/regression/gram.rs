@@ -187,8 +187,13 @@ impl Gram {
         if let Some(other) = features.iter().find(|&&j| j >= self.features) {
             return invalid(format!("part: expected features below {}, found {other}", self.features));
         }
-        let chosen = || features.iter().copied().chain([self.features]);
-        let products = chosen().flat_map(|i| chosen().map(move |j| self.product(i, j))).collect();
+        let all: Vec<usize> = features.iter().copied().chain([self.features]).collect();
+        let mut products = Vec::with_capacity(all.len() * all.len());
+        for &i in &all {
+            for &j in &all {
+                products.push(self.product(i, j));
+            }
+        }
         Ok(Self { features: features.len(), products, readings: self.readings })
     }
 

@@ -41,7 +41,7 @@ impl Whitening {
             (2, _) => Self::of_size::<2, 3>,
             (3, 0) => Self::of_size::<3, 3>,
             (3, _) => Self::of_size::<3, 4>,
-            (LONGEST, 0) => Self::of_size::<LONGEST, LONGEST>,
+            // So long a chain is rare: one that has no correlated disturbance has one of 0, and the code is there once.
             (LONGEST, _) => Self::of_size::<LONGEST, { LONGEST + 1 }>,
             (states, _) => unreachable!("a chain of {states} states"),
         };
