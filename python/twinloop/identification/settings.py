@@ -60,7 +60,7 @@ class IdentificationOptions:
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
         contacts: whether terms that begin at a place are searched, such as the force of a stop or of a gear with
-            backlash.
+            backlash, or the limit of how fast a servo turns.
         friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
         ramps: whether actuators may move at a limited rate.

@@ -99,8 +99,7 @@ def _structures(
                 continue
             terms = problem.usable(subset)
             if (i, subset) not in grams:
-                regression = problem.regression(found.chain, problem.values(terms))
-                grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, context.workers)
+                grams[i, subset] = problem.gram(found.chain, problem.values(terms))
             limits = problem.limits(found.chain, terms)
             solved = grams[i, subset].solve(list(range(len(terms))))
             if solved is None:

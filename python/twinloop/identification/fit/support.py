@@ -59,8 +59,7 @@ def borne(problem: Problem, found: Sum) -> Sum:
     rare = [i for i in range(len(terms)) if rows[:, i].sum() < enough]
     if len(terms) < len(found.weights) or len(rare) <= _bearable(rows, rare):
         return found
-    regression = problem.regression(found.chain, problem.values(terms))
-    gram = regression.gram(found.chain.sensors, found.chain.motion, problem.workers)
+    gram = problem.gram(found.chain, problem.values(terms))
     limits = problem.limits(found.chain, terms)
     must = {i for i, bounds in limits.items() if excludes_zero(bounds)}
     kept, weights = list(range(len(terms))), None

@@ -142,8 +142,7 @@ def _tuned(context: Context, problem: Problem, hypothesis: Hypothesis, i: int, n
     assert hypothesis.fit is not None
     known, sums = hypothesis.sums[i], list(hypothesis.sums)
     terms = problem.usable([*known.weights, node])
-    regression = problem.regression(known.chain, problem.values(terms))
-    gram = regression.gram(known.chain.sensors, known.chain.motion, problem.workers)
+    gram = problem.gram(known.chain, problem.values(terms))
     solved = gram.solve(list(range(len(terms))), RIDGE)
     if solved is None:
         return hypothesis

@@ -252,14 +252,8 @@ class Screen:
         ]
         columns = [self.problem.values(base)]
         columns += [problem.values(nodes) for (_, problem), nodes in zip(several, behind, strict=True)]
-        all_columns = np.concatenate(columns, axis=2)
-        driven = [found.chain for found in sums]
-        grams = [
-            self.problem.regression(chain, all_columns).gram(
-                chain.sensors, chain.motion, self.problem.workers
-            )
-            for chain in driven
-        ]
+        every, driven = np.concatenate(columns, axis=2), [found.chain for found in sums]
+        grams = [self.problem.gram(chain, every) for chain in driven]
         found, last = [], len(base)
         for (one, problem), nodes in zip(several, behind, strict=True):
             own = [*range(len(base)), *range(last, last + len(nodes))]

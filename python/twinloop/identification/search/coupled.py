@@ -166,8 +166,7 @@ class CoupledTerms:
         if not mass.min() > NEAREST * mass.max():
             return float("inf")
         explained = (over / mass)[:, :, np.newaxis]
-        regression = self.problem.regression(chain, explained, explained)
-        return regression.gram(chain.sensors, chain.motion, self.problem.workers).total
+        return self.problem.gram(chain, explained, explained).total
 
     def fitted(
         self, chains: Sequence[Chain], parts: Sequence[Chosen], masses: Sequence[Sequence[MassTerm]]
@@ -197,11 +196,11 @@ class CoupledTerms:
             chi_squared = 0.0
             for i, (chain, (acceleration, answer)) in enumerate(zip(chains, solved, strict=True)):
                 columns = self.columns(masses[i], [own.acceleration for own in solved])
-                gram = self.problem.regression(
+                gram = self.problem.gram(
                     chain,
                     answer[:, :, np.newaxis] * columns[:, :, parts[i].columns],
                     acceleration[:, :, np.newaxis],
-                ).gram(chain.sensors, chain.motion, self.problem.workers)
+                )
                 chi_squared += gram.total
                 step = gram.solve(list(range(gram.features)), RIDGE)
                 weights[i] = weights[i] if step is None else weights[i] + step[0]

@@ -38,7 +38,7 @@ def drive(problem: Problem, chain: Chain, inputs: Sequence[int]) -> dict[int, fl
 
     def solved(*features: Floats) -> tuple[Floats, float]:
         columns = np.concatenate(features, axis=2)
-        gram = problem.regression(chain, columns).gram(chain.sensors, chain.motion, problem.workers)
+        gram = problem.gram(chain, columns)
         answer = gram.solve(range(columns.shape[2]), RIDGE)
         return (np.zeros(columns.shape[2]), np.inf) if answer is None else (answer[0], answer[2])
 
@@ -69,13 +69,12 @@ def _followed(columns: Floats, inputs: Sequence[int], chain: Chain) -> Iterator[
 
     A state that follows a command is hardly driven where it has come near. None where it resembles no other.
     """
-    own = [place for place, i in enumerate(inputs) if i in chain.states]
-    spread = columns[0].std(axis=0)
+    own, spread = [inputs.index(i) for i in chain.states if i in inputs], columns[0].std(axis=0)
     others = [place for place in range(len(inputs)) if place not in own and spread[place] > 0.0]
     if not own or not others or not spread[own[-1]] > 0.0:
         return
     standard = (columns - columns[0].mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
-    state = standard[:, :, max(own, key=lambda place: chain.states.index(inputs[place]))]
+    state = standard[:, :, own[-1]]
     alike = [float((state[0] * standard[0, :, place]).mean()) for place in others]
     nearest = max(range(len(others)), key=lambda number: abs(alike[number]))
     yield state - np.sign(alike[nearest]) * standard[:, :, others[nearest]]

@@ -97,11 +97,6 @@ def _has_priors(problem: Problem, found: Sum) -> bool:
     return bounded(problem, found) or found.chain.states[0] in problem.priors.fixed
 
 
-def _gram(problem: Problem, chain: Chain, columns: Columns) -> _core.Gram:
-    """Inner products of columns, whitened by a chain's noise."""
-    return problem.regression(chain, columns).gram(chain.sensors, chain.motion, problem.workers)
-
-
 class _Joints:
     """The search for the equations of some joints."""
 
@@ -168,7 +163,7 @@ class _Joints:
         for joint, sum_ in enumerate(known):
             masses = [mass for mass in every if mass != (joint, self.pool.one)]
             columns = self.terms.columns(masses, accelerations)
-            gram = _gram(self.problem, sum_.chain, columns)
+            gram = self.problem.gram(sum_.chain, columns)
             posed.append(_Posed(gram, sum_.chain, columns, self.terms.costs(sum_.chain, masses), masses))
         constant = [self.terms.with_own_mass_of((), i, own.costs, own.masses) for i, own in enumerate(posed)]
         if not self._may_share_a_mass(known, posed, constant, walks.part(NOISE_ROUNDS + 1)):
@@ -324,7 +319,7 @@ class _Joints:
     def _explicit_length(self, known: Sum) -> float:
         """Description length of an acceleration by its known sum, under the noise that is known."""
         chain, terms = known.chain, self.problem.usable(list(known.weights))
-        gram = _gram(self.problem, chain, self.problem.values(terms))
+        gram = self.problem.gram(chain, self.problem.values(terms))
         solved = gram.solve(list(range(len(terms))), RIDGE)
         costs = prices(self.pool, terms, self.problem.readings(chain), len(self.problem.runs))
         return np.inf if solved is None else solved[2] + float(costs.sum())

@@ -98,7 +98,7 @@ def _at(
     if not values.min() > NEAREST * np.abs(values).max():
         return None
     columns = np.concatenate([plain, above / values[:, :, np.newaxis]], axis=2)
-    gram = problem.regression(chain, columns).gram(chain.sensors, chain.motion, problem.workers)
+    gram = problem.gram(chain, columns)
     solved = gram.solve(list(range(gram.features)), RIDGE)
     if solved is None:
         return None
@@ -110,7 +110,7 @@ def _at(
 def _step(problem: Problem, chain: Chain, point: _Point) -> Floats | None:
     """By how much the constants below the line are to change."""
     columns = np.concatenate([point.columns, point.slopes], axis=2)
-    gram = problem.regression(chain, columns).gram(chain.sensors, chain.motion, problem.workers)
+    gram = problem.gram(chain, columns)
     solved = gram.solve(list(range(gram.features)), RIDGE)
     if solved is None:
         return None

@@ -107,6 +107,13 @@ class Problem:
             readings = on(taken, readings).residuals(np.ones(taken.shape[2]))
         return on(columns, readings)
 
+    def gram(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Gram:
+        """Inner products of features and what they are to explain, whitened by a chain's noise.
+
+        Args as those of `regression`.
+        """
+        return self.regression(chain, columns, taken).gram(chain.sensors, chain.motion, self.workers)
+
     def feedthrough(self, chain: Chain, terms: Sequence[int]) -> Floats:
         """Share of a reading's noise that each term has in the prediction of the same reading.
 
