@@ -13,7 +13,8 @@ from twinloop.errors import TwinloopError
 from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.test import Test
-from twinloop.trajectory import check_recorded
+from twinloop.trajectory import check_recorded, completed
+from twinloop.unmeasured import completed_state
 
 __all__ = ["ContractBroken", "check_controller", "check_system"]
 
@@ -56,8 +57,9 @@ def check_system(
     family: Family = described.bind(signals)
     start = _first(initial_state, getattr(system, "initial_state", None), np.zeros(signals.n_x))
     target = _first(target_state, getattr(system, "target_state", None), np.zeros(signals.n_x))
+    start, target = (completed_state("Start and target", end, signals) for end in (start, target))
     test = Test(family, family.genes(chosen), start, target, steps)
-    trajectory = system.run(test)
+    trajectory = completed(system.run(test), signals, test.initial_state)
     check_recorded(trajectory, Limits(signals), steps)
     if trajectory.ended == "completed":
         _promise(trajectory.steps == steps, f"a completed run of {steps} steps, found {trajectory.steps}")
@@ -67,7 +69,7 @@ def check_system(
         low, high = command.bounds
         inside = bool((sent >= low).all() and (sent <= high).all())
         _promise(inside, f"{command.name} within {low:g} to {high:g}, found {sent.min():g} to {sent.max():g}")
-    again = system.run(test)
+    again = completed(system.run(test), signals, test.initial_state)
     # Whose sensors are exact answers alike, unless it says that something else is noisy.
     exact = trajectory.true_states is not None and np.allclose(
         trajectory.states, trajectory.true_states, rtol=0.0, atol=1e-6 * min(s.scale for s in signals.states)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from functools import cached_property
 from keyword import iskeyword
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats, number
+from twinloop._ground.arrays import Floats, number, whole
 from twinloop._ground.texts import text
 from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, unknown
@@ -23,6 +23,8 @@ TURNS = {"rad": 2.0 * math.pi, "deg": 360.0}
 """A whole turn in the units of angles."""
 WHOLE_TURN = 0.99
 """Share of its period that the envelope of an angle spans if it bounds nothing: -3.14 to 3.14 is a whole turn."""
+QUICK = 10.0
+"""Periods in which a state goes through its scale, at the scale of a rate that is made of past readings."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,12 @@ class State(Recorded, kind="state"):
             estimate there, and a remark says if the two differ much.
         periodic: whether it is an angle that wraps: True for an angle in rad, or its period in its unit, such as
             360.0. Errors and differences then take the short way, and a model sees it within half a period of 0.
+        measured: False of a rate that no sensor reads: records may leave it out. Where they do, it is what the readings
+            of `derivative_of` change by over a period, and so it is for a controller.
 
     Raises:
-        InvalidInput: a name, unit, scale, envelope, noise or period that cannot be used.
+        InvalidInput: a name, unit, scale, envelope, noise or period that cannot be used, or one that is not measured
+            and the derivative of nothing.
     """
 
     name: str
@@ -52,11 +57,23 @@ class State(Recorded, kind="state"):
     envelope: Bounds | None = None
     noise: float | None = None
     periodic: bool | float = False
+    measured: bool = True
+
+    VERSION = 2
 
     def __post_init__(self) -> None:
         _check_words("State", self.name, self.unit)
         if self.derivative_of is not None:
             text(f"State {self.name!r}, derivative_of", self.derivative_of)
+        if not isinstance(self.measured, bool):
+            raise InvalidInput(
+                f"State {self.name!r}, measured: expected True or False, found {self.measured!r}."
+            )
+        if not self.measured and self.derivative_of is None:
+            raise InvalidInput(
+                f"State {self.name!r}: expected derivative_of of a state that is not measured, found none; name the"
+                " state whose readings it is made of, or leave this one out: what is hidden is looked for."
+            )
         object.__setattr__(self, "scale", number(f"State {self.name!r}, scale", self.scale, above=0.0))
         if self.envelope is not None:
             object.__setattr__(self, "envelope", ordered(f"State {self.name!r}, envelope", self.envelope))
@@ -158,21 +175,27 @@ class Signals(Value, Recorded, kind="signals"):
         commands: n_u of them, in the order of a command vector.
         dt: period, s; a command is held for one period.
         kinematics: which states are angles and body rates of a rigid body, if there are any.
+        lags: past readings of which the rest of the state may be made, where only outputs are measured. From 1 on, each
+            state that has no derivative gets its rate, as `angle_rate` of `angle`, a state that is not measured. More
+            than one adds nothing: rates of rates are noise, and what else is hidden the preset `default` looks for.
 
     Raises:
-        InvalidInput: no states or no commands, a name used twice, or a `derivative_of` or `kinematics` that do not
-            fit.
+        InvalidInput: no states or no commands, a name used twice, a `derivative_of` or `kinematics` that do not fit, or
+            lags that are no whole number.
     """
 
     states: Sequence[State]
     commands: Sequence[Command]
     dt: float
     kinematics: RigidBody | None = None
+    lags: InitVar[int] = 0
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, lags: int) -> None:
         object.__setattr__(self, "states", _members("states", State, self.states))
         object.__setattr__(self, "commands", _members("commands", Command, self.commands))
         object.__setattr__(self, "dt", number("Signals, dt (s)", self.dt, above=0.0))
+        if whole("Signals, lags", lags):
+            object.__setattr__(self, "states", (*self.states, *self._rates()))
         names = self.state_names + self.command_names
         for name in names:
             if names.count(name) > 1:
@@ -190,6 +213,19 @@ class Signals(Value, Recorded, kind="signals"):
                     raise unknown("state in the kinematics", name, self.state_names)
             self._check_turned(self.kinematics)
 
+    def _rates(self) -> list[State]:
+        """Rates, not measured, of the states whose motion is learnt."""
+        return [
+            State(
+                f"{state.name}_rate",
+                _a_second(state.unit),
+                state.scale / (QUICK * self.dt),
+                derivative_of=state.name,
+                measured=False,
+            )
+            for state in (self.states[i] for i in self._learnt)
+        ]
+
     def _check_turned(self, body: RigidBody) -> None:
         """Refuses angles of a body that have a derivative besides: body rates already say how they turn."""
         declared = [state for state in self.states if state.derivative_of in body.angles]
@@ -204,6 +240,7 @@ class Signals(Value, Recorded, kind="signals"):
     def _check_derivatives(self) -> None:
         parents = {state.name: state.derivative_of for state in self.states}
         integrals = [of for of in parents.values() if of is not None]
+        made = {state.name: state.measured for state in self.states}
         for name, of in parents.items():
             if of is None:
                 continue
@@ -215,6 +252,11 @@ class Signals(Value, Recorded, kind="signals"):
                     "keep `derivative_of` on one of them."
                 )
             self._check_unit(name, of)
+            if not made[name] and not made[of]:
+                raise InvalidInput(
+                    f"Signals: expected {of!r} to be measured, of whose readings {name!r} is made, found that it is"
+                    f" not; leave {name!r} out: what else is hidden is looked for."
+                )
             seen, up = {name}, of
             while up is not None:
                 if up in seen:
@@ -258,10 +300,25 @@ class Signals(Value, Recorded, kind="signals"):
     @cached_property
     def driven(self) -> tuple[int, ...]:
         """States whose motion is learnt: all except integrals of other states and angles of a rigid body."""
+        return self._learnt
+
+    @property
+    def _learnt(self) -> tuple[int, ...]:
+        """The same of the states that there are so far."""
         given = {state.derivative_of for state in self.states}
         if self.kinematics is not None:
             given |= set(self.kinematics.angles)
         return tuple(i for i, name in enumerate(self.state_names) if name not in given)
+
+    @cached_property
+    def unmeasured(self) -> tuple[int, ...]:
+        """States that no sensor reads, in order."""
+        return tuple(i for i, state in enumerate(self.states) if not state.measured)
+
+    @cached_property
+    def measured(self) -> tuple[int, ...]:
+        """States that sensors read, in order."""
+        return tuple(i for i, state in enumerate(self.states) if state.measured)
 
     @cached_property
     def periods(self) -> tuple[tuple[int, float], ...]:
@@ -375,6 +432,11 @@ def _check_words(kind: str, name: object, unit: object) -> None:
             "it becomes a symbol in equations, so rename it."
         )
     text(f"{kind} {name!r}, unit", unit)
+
+
+def _a_second(unit: str) -> str:
+    """The unit of the rate of what has a unit."""
+    return f"{unit.removesuffix('/s')}/s²" if unit.endswith("/s") else f"{unit}/s"
 
 
 def _members(what: str, kind: type, values: object) -> tuple[object, ...]:

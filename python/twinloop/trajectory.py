@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from twinloop.errors import AtRow, InvalidInput, unknown
 from twinloop.records import Recorded
 from twinloop.records.reading import MOST_ITEMS
 from twinloop.signals import Signals
+from twinloop.unmeasured import completed_readings, lacks
 
+Run = TypeVar("Run")
 ENDINGS = ("completed", "aborted", "diverged")
 JITTER = 0.01
 """Share of the period by which a recorded interval may differ from it."""
@@ -159,6 +162,21 @@ def check_period(trajectory: Trajectory, signals: Signals) -> None:
         )
 
 
+def completed(run: Run, signals: Signals, start: Floats | None = None) -> Run:
+    """The run with columns for states that are not measured.
+
+    Args:
+        run: as recorded, with a column for each state that is measured, in their order; anything else is given back.
+        signals: of the system.
+        start: the state that the run was to start from (n_x,); None: nobody knows.
+    """
+    if isinstance(run, Trajectory) and lacks(run.states, signals):
+        return replace(
+            run, states=completed_readings(run.states, signals, start), true_states=None, band=None
+        )
+    return run
+
+
 def equal_runs(one: Trajectory, other: Trajectory) -> bool:
     """Whether two runs have the same states and commands, to the last digit.
 
@@ -168,6 +186,17 @@ def equal_runs(one: Trajectory, other: Trajectory) -> bool:
     """
     pairs = (one.states, other.states), (one.commands, other.commands)
     return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)
+
+
+def recorded_as(run: Trajectory, other: Trajectory, signals: Signals) -> bool:
+    """Whether a record is that of another run, to the last digit; it may lack what is not measured.
+
+    Args:
+        run: as recorded.
+        other: run, with columns for all states.
+        signals: of the system.
+    """
+    return equal_runs(completed(run, signals, other.states[0]), other)
 
 
 def begins_as(one: Trajectory, other: Trajectory) -> bool:

@@ -345,7 +345,7 @@ STATE = {"kind": "state", "version": 1, "name": "angle", "unit": "rad", "scale":
         ([], "dict"),
         ({}, "'state'"),
         ({**STATE, "kind": "command"}, "'command'"),
-        ({**STATE, "version": 2}, "newer Twinloop"),
+        ({**STATE, "version": 3}, "newer Twinloop"),
         ({**STATE, "version": "1"}, "whole number"),
         ({**STATE, "version": True}, "whole number"),
         ({**STATE, "scales": 1.0}, "did you mean 'scale'"),

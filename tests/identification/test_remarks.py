@@ -48,7 +48,7 @@ def test_behind_an_evolved_law_the_next_one_is_named():
 def of_still(level, pump):
     """What is said of whether the level moved, of a run of 30 periods."""
     run = Run.of(np.full((31, 1), 0.3) + level, pump)
-    said = remarks([run], Pool(2, 10), SIGNALS, [], 30.0, 30)
+    said = remarks([run], Pool(2, 10), SIGNALS, [], 30.0, 30, 0)
     return [(remark.code, remark.severity) for remark in said]
 
 

@@ -32,7 +32,7 @@ KINEMATICS = '[kinematics] with angles = ["roll", "pitch", "yaw"] and rates = ["
 MOST_BYTES = 10_000_000
 """Of a campaign file."""
 SECTIONS = (
-    *("dt", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options"),
+    *("dt", "lags", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options"),
     *("autopilot", "system", "log"),
 )
 TASK = ("initial_state", "target_state", "duration")
@@ -42,6 +42,7 @@ TEMPLATE = """\
 # Units are SI and radians; names of states and commands become symbols in equations.
 
 dt = 0.05                        # period of the commands, s
+# lags = 1                       # if only outputs are measured: the rate of each state is made of its past reading
 
 [states.angle]                   # one section a state, in the order of the state vector
 unit = "rad"
@@ -55,6 +56,7 @@ derivative_of = "angle"
 envelope = [-12.0, 12.0]
 # noise = 0.01                   # standard deviation of the sensor, if it is known
 # periodic = false               # true: an angle that wraps
+# measured = true                # false: no sensor reads it, and records leave it out; it is made of those of angle
 
 # [kinematics]                   # if gyroscopes measure the body rates of roll, pitch and yaw: instead of derivative_of
 # angles = ["roll", "pitch", "yaw"]
@@ -216,7 +218,7 @@ def read_file(path: str | Path) -> CampaignFile:
     if described:
         signals = _signals(found)
     else:
-        for key in ("dt", "commands", "kinematics"):
+        for key in ("dt", "lags", "commands", "kinematics"):
             if key in found:
                 raise InvalidInput(
                     f"Campaign file, {path}: expected [states] beside {key}, found none; add them, or leave {key}"
@@ -277,6 +279,7 @@ def _signals(found: Mapping[str, Any]) -> Signals:
         commands=_members(found, "commands", Channel),
         dt=found["dt"],
         kinematics=_kinematics(found["kinematics"]) if "kinematics" in found else None,
+        lags=found.get("lags", 0),
     )
 
 

@@ -16,7 +16,7 @@ from twinloop.errors import InvalidInput
 from twinloop.law.accuracy import squares
 from twinloop.objectives import frozen_error
 from twinloop.test import Test, final_distance
-from twinloop.trajectory import Trajectory, check_recorded, continued
+from twinloop.trajectory import Trajectory, check_recorded, completed, continued
 
 FAR = 5.0
 """A first reading is refused if it is this many times further off than the second, and than the next readings move."""
@@ -39,6 +39,7 @@ def flown_test(setup: Setup, test: Test, trajectory: Trajectory, judge: Judge, l
     Raises:
         InvalidInput: a trajectory that cannot be learnt from.
     """
+    trajectory = completed(trajectory, setup.signals, test.initial_state)
     check_recorded(trajectory, setup.limits, test.steps, least)
     recorded = continued(trajectory, setup.signals, test.initial_state)
     check_first_reading(recorded, test)
@@ -62,6 +63,7 @@ def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge) -> Experime
     Raises:
         InvalidInput: a trajectory that cannot be learnt from.
     """
+    trajectory = completed(trajectory, setup.signals)
     check_recorded(trajectory, setup.limits, None)
     recorded = continued(trajectory, setup.signals, trajectory.states[0])
     replayed = Replay(setup.signals, recorded.states[0], recorded.commands)

@@ -14,6 +14,7 @@ from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.law.accuracy import squares
+from twinloop.law.beginning import start_of
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import in_pieces, judged_length
@@ -65,17 +66,43 @@ def length_of(
     return judged_length(model, flown, noise, limits, workers)
 
 
-def as_flown(model: _core.Model, flight: Experiment, length: int) -> Test | Replay:
+def as_flown(
+    model: _core.Model,
+    flight: Experiment,
+    length: int,
+    limits: Limits,
+    workers: _core.Workers | None = None,
+) -> Test | Replay:
     """What a model flies to be held against a flight.
 
     Args:
         model: that is flown.
         flight: that was made.
         length: steps of the pieces in which it is followed.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
     """
-    states = flight.trajectory.states
-    flown = cut(flight.replayed, start_of(model, states[0]), flight.trajectory.steps)
-    return in_pieces(flown, model, states, length) if isinstance(flown, Replay) else flown
+    flown = whole(model, flight, limits, workers)
+    return in_pieces(flown, model, flight.trajectory.states, length) if isinstance(flown, Replay) else flown
+
+
+def whole(
+    model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers | None = None
+) -> Test | Replay:
+    """What was flown of a flight, from where it began.
+
+    Args:
+        model: that is to fly it.
+        flight: that was made.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    run = flight.trajectory
+    if isinstance(flight.replayed, Replay):
+        start = start_of(model, run.states, run.commands, limits, workers)
+    else:
+        start = model.states_of(run.states[:1])[0]
+    return cut(flight.replayed, start, run.steps)
 
 
 def missed_by(
@@ -94,12 +121,6 @@ def missed_by(
     """
     runs = drawn_runs(model, flown, limits, workers=workers)
     return squares(np.asarray(runs.read[0])[1:], read, limits.signals), int(runs.lasted[0])
-
-
-def start_of(model: _core.Model, reading: Floats) -> Floats:
-    """The state of a model that is read so (n_x,)."""
-    start: Floats = model.states_of(reading[np.newaxis])[0]
-    return start
 
 
 def cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:

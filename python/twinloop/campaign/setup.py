@@ -30,6 +30,7 @@ from twinloop.planning.quality import KINDS, Quality, quality_of, weights_of
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.signals import Signals
 from twinloop.test import checked_target
+from twinloop.unmeasured import completed_rows, completed_state, lacks
 
 MOST_STEPS = 10_000_000
 """Of a test in a record."""
@@ -268,9 +269,11 @@ def _described(flights: Flights) -> tuple[Signals, UnboundFamily]:
 def _task(flights: Flights, signals: Signals) -> tuple[int, Floats, Floats]:
     """Steps of a test, where it starts and where it should end."""
     steps = _steps(number("Campaign, duration (s)", flights.duration, above=0.0), signals.dt)
-    start = floats("Campaign, initial_state", flights.initial_state, (signals.n_x,))
+    start = completed_state("Campaign, initial_state", flights.initial_state, signals)
     target = flights.target_state
     rows = _sampled(target, signals, steps) if callable(target) else target
+    if lacks(rows, signals):
+        rows = completed_rows("Campaign, target_state", rows, signals)
     return steps, start, checked_target("Campaign, target_state", rows, signals.n_x, steps)
 
 
@@ -305,10 +308,12 @@ def _weighed(
 
 
 def _sampled(reference: Callable[[float], ArrayLike], signals: Signals, steps: int) -> Floats:
-    """A function of time at the start of every period, and at the end of the last (steps + 1, n_x)."""
+    """A function of time at the start of every period, and at the end of the last (steps + 1, its columns)."""
     times = [k * signals.dt for k in range(steps + 1)]
-    rows = [floats(f"Campaign, target_state({t:g} s)", reference(t), (signals.n_x,)) for t in times]
-    return np.array(rows)
+    values = [reference(t) for t in times]
+    columns = len(signals.measured) if lacks(values[0], signals) else signals.n_x
+    rows = zip(times, values, strict=True)
+    return np.array([floats(f"Campaign, target_state({t:g} s)", row, (columns,)) for t, row in rows])
 
 
 def _check_use(options: AnyOptions, signals: Signals) -> None:

@@ -20,6 +20,7 @@ from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.replaying import as_flown, length_of, missed_by
 from twinloop.campaign.setup import Setup
 from twinloop.law.accuracy import TestErrors, squares
+from twinloop.law.beginning import states_read
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import held, in_pieces
@@ -119,7 +120,9 @@ def _free_error(
 ) -> FreeError:
     """Of a free run in pieces of a length, in units of the states' scales."""
     read, steps = run.trajectory.states, run.trajectory.steps
-    missed, lasted = missed_by(model, as_flown(model, run, length), read[1:], limits, workers)
+    missed, lasted = missed_by(
+        model, as_flown(model, run, length, limits, workers), read[1:], limits, workers
+    )
     still = squares(read[1:], held(read, length), limits.signals)
     return FreeError(float(missed.mean()) if lasted == steps else np.inf, float(still.mean()), length)
 
@@ -133,7 +136,7 @@ def _one_step_errors(model: _core.Model, book: Logbook, workers: _core.Workers) 
 
 
 def _one_step_error(model: _core.Model, run: Experiment, limits: Limits, workers: _core.Workers) -> float:
-    states = model.states_of(run.trajectory.states)
+    states = states_read(model, run.trajectory.states, limits.signals)
     sent = Replay(limits.signals, states[0], run.trajectory.commands)
     stepwise = in_pieces(sent, model, run.trajectory.states, 1)
     found = drawn_runs(model, stepwise, limits, workers=workers)

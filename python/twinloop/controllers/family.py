@@ -19,6 +19,7 @@ from twinloop._ground.values import Value
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import Signals
+from twinloop.unmeasured import Differences, completed_state, lacks
 
 AT_A_BOUND = 0.01
 """Share of its range within which a gain counts as at a bound."""
@@ -236,6 +237,7 @@ class Controller:
         self.excitation = excitation
         held = None if hold_back is None else hold_back.engine
         self._law = family.engine.controller(genes, excitation, held)
+        self._differences = Differences(family.signals)
         self.reset()
 
     @property
@@ -246,12 +248,13 @@ class Controller:
     def reset(self) -> None:
         """Clears the memory and restarts the excitation; call it at the start of every run."""
         self._law.reset()
+        self._differences.reset()
 
     def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
         """The command for the coming period.
 
         Args:
-            state: measured state (n_x,), SI units, radians.
+            state: measured state (n_x,), SI units, radians; or of those states alone that are measured.
             target: target state (n_x,), the same units.
 
         Returns:
@@ -260,9 +263,12 @@ class Controller:
         Raises:
             InvalidInput: another shape, or a number that is not finite; the memory is unchanged.
         """
-        n_x = self.family.signals.n_x
-        reading, goal = floats("State", state, (n_x,)), floats("Target", target, (n_x,))
-        return self._law.command(reading, goal)
+        signals = self.family.signals
+        goal = completed_state("Target", target, signals)
+        reading = floats("State", state, (None,))
+        if not lacks(reading, signals):
+            return self._law.command(floats("State", reading, (signals.n_x,)), goal)
+        return self._law.command(self._differences.completed(reading), goal)
 
     def commands(self, states: Floats, targets: Floats) -> Floats:
         """The commands of a whole run, from rest.
@@ -296,6 +302,7 @@ class Controller:
         copied = object.__new__(Controller)
         copied.__dict__.update(self.__dict__)
         copied._law = self._law.copied()
+        copied._differences = copy.copy(self._differences)
         return copied
 
     def __deepcopy__(self, memo: dict[int, object]) -> Controller:

@@ -23,7 +23,7 @@ from twinloop.faces.text import table
 from twinloop.law.twin import Twin
 from twinloop.logs import read_log
 from twinloop.signals import Signals
-from twinloop.trajectory import Trajectory, check_recorded
+from twinloop.trajectory import Trajectory, check_recorded, completed
 
 
 @click.command()
@@ -96,7 +96,7 @@ def _flight(file: Path, signals: Signals, config: Path) -> Trajectory:
     log = read_log(file, signals, columns=read_fields(config))
     for remark in log.remarks:
         click.echo(f"Log {file}: {remark}", err=True)
-    flight = log.trajectory()
+    flight = completed(log.trajectory(), signals)
     try:
         with log.errors():
             check_recorded(flight, Limits(signals), None)

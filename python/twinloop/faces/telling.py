@@ -13,7 +13,7 @@ from twinloop.errors import InvalidInput
 from twinloop.logs import Log, read_log
 from twinloop.store import shown_name
 from twinloop.test import Test
-from twinloop.trajectory import Trajectory, begins_as, check_period, equal_runs
+from twinloop.trajectory import Trajectory, begins_as, check_period, recorded_as
 
 
 def numbered(campaign: Campaign, number: int) -> Test:
@@ -190,7 +190,9 @@ def told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> lis
 def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | None) -> None:
     """Refuses a log that is there already; a system without noise repeats itself where a test is flown again."""
     for told in campaign.experiments:
-        if equal_runs(run, told.trajectory) and not (test is not None and _again(told.test, test)):
+        if recorded_as(run, told.trajectory, campaign.signals) and not (
+            test is not None and _again(told.test, test)
+        ):
             raise InvalidInput(
                 f"Log {called}: expected a new flight, found one that is recorded already, equal to the last"
                 " digit; nothing was changed. Name the log of this flight."

@@ -17,7 +17,7 @@ from twinloop.faces.answering import answer, json_option
 from twinloop.faces.telling import counted
 from twinloop.logs import load
 from twinloop.store import shown_name
-from twinloop.trajectory import equal_runs
+from twinloop.trajectory import recorded_as
 
 ATTACHED = re.compile(r"attached-(\d+)")
 """How an attached flight is called, counted from 1."""
@@ -75,7 +75,7 @@ def chosen(campaign: Campaign, which: str) -> int | Experiment:
         return found
     if place is None and Path(which).is_file():
         run = load(Path(which), campaign.signals)
-        equal = [each for each in campaign.experiments if equal_runs(run, each.trajectory)]
+        equal = [each for each in campaign.experiments if recorded_as(run, each.trajectory, campaign.signals)]
         if equal:
             return equal[-1]
     raise InvalidInput(

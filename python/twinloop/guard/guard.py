@@ -22,6 +22,7 @@ from twinloop.law.twin import Twin
 from twinloop.signals import Bounds, Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+from twinloop.unmeasured import Differences, completed_state
 
 HORIZON = 0.2
 """Share of a test's length that is looked ahead where no horizon is given."""
@@ -95,6 +96,7 @@ class Guard:
         limits = Limits(self.signals) if limits is None else limits
         self._sensors = SensorWatch(limits.readings, () if twin is None else twin.flights)
         self._controller = test.controller()
+        self._differences = Differences(self.signals)
         self._states = np.empty((test.steps + 1, n_x))
         self._commands = np.empty((test.steps, n_u))
         self.reset()
@@ -111,6 +113,7 @@ class Guard:
         self._broken = np.zeros(self.signals.n_x, bool)
         self._estimate: Floats | None = None
         self._controller.reset()
+        self._differences.reset()
         self._sensors.reset()
         if isinstance(self.fallback, Controller):
             self.fallback.reset()
@@ -123,7 +126,8 @@ class Guard:
         """The command for the coming period.
 
         Args:
-            state: reading (n_x,), SI units, radians; NaN for a missing value.
+            state: reading (n_x,), SI units, radians; NaN for a missing value. Or of those states alone that are
+                measured.
             target: target state (n_x,), the same units.
 
         Returns:
@@ -139,11 +143,12 @@ class Guard:
             raise InvalidInput(
                 f"Guard.command, state: expected numbers, found {reason}; pass NaN for a missing one."
             ) from reason
+        reading = self._differences.completed(reading)
         if reading.shape != (self.signals.n_x,):
             raise InvalidInput(
                 f"Guard.command, state: expected {self.signals.n_x} numbers, found shape {reading.shape}."
             )
-        goal = floats("Guard.command, target", target, (self.signals.n_x,))
+        goal = completed_state("Guard.command, target", target, self.signals)
         own = None
         if not self.tripped:
             with self._tripping("a check"):
@@ -209,7 +214,8 @@ class Guard:
                 " first."
             )
         states = self._states[: n + 1].copy()
-        states[n] = floats("Guard, last reading", last, (self.signals.n_x,))
+        own = self._differences.completed(np.asarray(last, dtype=np.float64))
+        states[n] = floats("Guard, last reading", own, (self.signals.n_x,))
         if ended_at is not None:
             ended, reason = "aborted", self.reason
         elif n < steps:

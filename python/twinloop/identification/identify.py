@@ -34,7 +34,7 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
 from twinloop.identification.terms.directions import Direction
 from twinloop.law.levels import Levels
-from twinloop.law.reports import Held, Reports, late_in, old, with_late
+from twinloop.law.reports import Held, Reports, late_in, old, unread, with_late
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -105,7 +105,10 @@ def identify_runs(
     Returns:
         What was learnt, the same bits wherever it went on from.
     """
-    logged, reports = [run.continued(signals) for run in runs], reports if options.reports else ()
+    logged, reports = (
+        [run.continued(signals) for run in runs],
+        reports if options.reports else unread(reports, signals),
+    )
     context = Context(
         [as_sensed(run, reports, signals) for run in logged],
         signals,
@@ -185,6 +188,9 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
     # What parts have entered stays known.
     of_rivals = (rival.pool for rival in found.rivals if rival.of_part)
     pool = max((best.pool, *(pool for pool in of_rivals if pool.extends(best.pool))), key=len)
+    # Where a report stands for readings, rows without one are no outliers.
+    read = [i for i, report in enumerate(context.reports or (None,) * signals.n_x) if report is None]
+    outliers = int(sum((run.weights[:, read] == 0.0).sum() for run in best.runs))
     driven, ages = [chain.states[0] for chain in best.driven], late_in(context.reports, signals.n_x)
     return Identified(
         model=seated.members[0],
@@ -196,12 +202,12 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
         offsets=best.offsets,
         chi_squared=fit.chi_squared,
         readings=fit.readings,
-        outliers=int(sum((run.weights == 0.0).sum() for run in best.runs)),
+        outliers=outliers,
         description_length=fit.length,
         of_parts=seated.of_parts,
         remarks=[
             *said,
-            *remarks(best.runs, pool, signals, sums, fit.chi_squared, fit.readings),
+            *remarks(best.runs, pool, signals, sums, fit.chi_squared, fit.readings, outliers),
             *late_sensors(best.offsets + signals.dt * np.array(ages), driven, signals),
             *other_noise(fit.observer, signals),
             *held_at_bounds(sums, best.candidates.priors.bounds, pool, signals, best.form),

@@ -150,7 +150,13 @@ def other_noise(observer: Sequence[Chain], signals: Signals) -> list[Remark]:
 
 
 def remarks(
-    runs: Sequence[Run], pool: Pool, signals: Signals, sums: Sequence[Sum], chi_squared: float, readings: int
+    runs: Sequence[Run],
+    pool: Pool,
+    signals: Signals,
+    sums: Sequence[Sum],
+    chi_squared: float,
+    readings: int,
+    ignored: int,
 ) -> list[Remark]:
     """Remarks on what was learnt.
 
@@ -161,11 +167,11 @@ def remarks(
         sums: of the best model.
         chi_squared: χ² of its predictions.
         readings: that counted.
+        ignored: readings that did not, for they were taken for outliers.
 
     Returns:
         Misfit, exact readings, states that never moved, identities, outliers; none where there is nothing to say.
     """
-    ignored = int(sum((run.weights == 0.0).sum() for run in runs))
     said = []
     if not np.isfinite(chi_squared):
         said.append(

@@ -24,6 +24,7 @@ from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import exp
 from twinloop.law.accuracy import left, squares
+from twinloop.law.beginning import start_of, states_read
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise, reaches
 from twinloop.trajectory import Trajectory, continued
@@ -57,7 +58,8 @@ def in_pieces(replay: Replay, model: _core.Model, readings: Floats, length: int)
     if length >= replay.steps:
         return replay
     anchors = np.full((replay.steps + 1, readings.shape[1]), np.nan)
-    anchors[:-1:length] = model.states_of(np.ascontiguousarray(readings[:-1:length]))
+    anchors[:-1:length] = states_read(model, readings, replay.signals)[:-1:length]
+    anchors[0] = replay.initial_state
     return dataclasses.replace(replay, anchors=anchors)
 
 
@@ -89,7 +91,7 @@ def judged_length(
     signals = limits.signals
     scales = np.array([state.scale for state in signals.states])
     readings = continued(flight, signals, flight.states[0]).states
-    start = model.states_of(readings[:1])[0]
+    start = start_of(model, readings, flight.commands, limits, workers)
     whole = Replay(signals, start, flight.commands)
     runs = drawn_runs(model, whole, limits, workers=workers)
     free, frozen = (

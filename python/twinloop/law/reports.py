@@ -91,6 +91,12 @@ def given(reports: Reports, readings: Floats) -> Floats:
     return found
 
 
+def unread(reports: Reports, signals: Signals) -> Reports:
+    """Those alone of states that are not measured."""
+    kept = tuple(report if i in signals.unmeasured else None for i, report in enumerate(reports))
+    return kept if any(kept) else ()
+
+
 def old(reports: Reports, ages: Sequence[int]) -> Reports:
     """The same with readings of slow sensors that are so many periods old when they are given (n_x)."""
     return tuple(

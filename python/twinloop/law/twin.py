@@ -19,6 +19,7 @@ from twinloop._ground.showing import Shown
 from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
+from twinloop.law.beginning import start_of
 from twinloop.law.equations import Equations
 from twinloop.law.exports.environment import Reward, environment
 from twinloop.law.exports.gymnasium_source import Episode
@@ -35,7 +36,8 @@ from twinloop.records import Record, Recorded, checked_record, from_text, read
 from twinloop.remarks import Remark, warn
 from twinloop.signals import Signals
 from twinloop.test import Test, check_signals
-from twinloop.trajectory import Trajectory, check_recorded, continued
+from twinloop.trajectory import Trajectory, check_recorded, completed, continued
+from twinloop.unmeasured import completed_state
 
 STARTS = 5.0
 """Standard deviations of a sensor by which a flight's first reading may be off the state that its test asks for."""
@@ -100,7 +102,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         """Multiple of a state's scale at which that is, as records have it."""
         return self._limits.divergence_factor
 
-    VERSION = 6
+    VERSION = 7
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -252,7 +254,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         """
         check_signals(test, self.signals)
         if initial_state is not None:
-            start = floats("Initial state", initial_state, (self.signals.n_x,))
+            start = completed_state("Initial state", initial_state, self.signals)
             test = dataclasses.replace(test, initial_state=start)
         run = self._simulated(test)
         warn(far_beyond(self.flown, run, self.signals), stacklevel=2)
@@ -280,10 +282,11 @@ class Twin(Shown, Value, Recorded, kind="twin"):
             The test; a state starts at its first reading if this is further from the test's start than sensor noise
             explains. Recorded commands are flown in the pieces of `piece_of`, each from its own first reading.
         """
-        begun = self.began(flown)
         if isinstance(test, Replay):
-            whole = dataclasses.replace(test, initial_state=begun)
+            start = start_of(self.model, flown.states, flown.commands, self.limits)
+            whole = dataclasses.replace(test, initial_state=start)
             return in_pieces(whole, self.model, flown.states, self.piece_of(flown))
+        begun = self.began(flown)
         explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
         off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
@@ -453,7 +456,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         Raises:
             InvalidInput: shapes that do not fit.
         """
-        state = floats("Initial state", initial_state, (self.signals.n_x,))
+        state = completed_state("Initial state", initial_state, self.signals)
         u = floats("Commands", commands, (None, self.signals.n_u))
         low, high = np.array([command.bounds for command in self.signals.commands]).T
         sent = np.clip(u if len(u) else [low], low, high)
@@ -477,6 +480,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         Raises:
             InvalidInput: other columns, or no step.
         """
+        trajectory = completed(trajectory, self.signals)
         check_recorded(trajectory, self.limits, None, least=1)
         noise = Noise.of_sensors(np.zeros(self.signals.n_x)) if self.noise is None else self.noise
         return judged_length(self.model, trajectory, noise, self.limits)
@@ -495,11 +499,13 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         Raises:
             InvalidInput: other columns, or no step.
         """
+        trajectory = completed(trajectory, self.signals)
         check_recorded(trajectory, self.limits, None, least=1)
-        whole = Replay(self.signals, self.began(trajectory), trajectory.commands)
-        sent = in_pieces(whole, self.model, trajectory.states, self.piece_of(trajectory))
-        free = fly(self.model, sent, limits=self.limits).states
-        read = continued(trajectory, self.signals, trajectory.states[0]).states[1:]
+        states = continued(trajectory, self.signals, trajectory.states[0]).states
+        start = start_of(self.model, states, trajectory.commands, self.limits)
+        whole = Replay(self.signals, start, trajectory.commands)
+        sent = in_pieces(whole, self.model, states, self.piece_of(trajectory))
+        free, read = fly(self.model, sent, limits=self.limits).states, states[1:]
         return fit_table(self.signals, read, free[1:] if len(free) > len(read) else None)
 
     def __repr__(self) -> str:

@@ -20,6 +20,7 @@ from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
+from twinloop.unmeasured import lacks, logged
 
 TIME = "t"
 """Name of the column of times, s."""
@@ -62,7 +63,9 @@ class Log:
             InvalidInput: a value that is no number, or columns that are no flight.
         """
         with self.errors():
-            names = (*self.signals.state_names, *self.signals.command_names)
+            measured = (state.name for state in self.signals.states if state.measured)
+            states = measured if lacks(self.states, self.signals) else self.signals.state_names
+            names = (*states, *self.signals.command_names)
             _refuse_no_number(self.t, names, (self.states, self.commands))
             return Trajectory(self.t, self.states, self.commands, ended=ended, reason=reason)
 
@@ -85,8 +88,9 @@ def load(
     """A recorded flight from a file.
 
     A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order; other
-    columns are ignored, and the commands of the last row may be empty. A file of NumPy (`.npz`) has arrays `t` (n +
-    1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), whose last row is ignored.
+    columns are ignored, states that are not measured may be missing, and the commands of the last row may be empty. A
+    file of NumPy (`.npz`) has arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u),
+    whose last row is ignored.
 
     A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with its own times. They are resampled to the
     period of the signals: states are interpolated between two samples, and each command is the last one sent. If two
@@ -253,7 +257,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
             f"Log {called}: expected columns of numbers, found: {reason}; save it as CSV."
         ) from reason
     names = [name.strip() for name in rows[0][1]] if rows else []
-    wanted = (TIME, *signals.state_names, *signals.command_names)
+    states_read = [state.name for state in logged(signals, names)]
+    wanted = (TIME, *states_read, *signals.command_names)
     twice = next((name for name in wanted if names.count(name) > 1), None)
     if twice is not None:
         raise InvalidInput(
@@ -281,7 +286,7 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         return np.array([column(name, count) for name in wanted]).reshape(len(wanted), -1).T
 
     n = len(body)
-    t, states = np.array(column(TIME, n)), matrix(signals.state_names, n)
+    t, states = np.array(column(TIME, n)), matrix(states_read, n)
     return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body]
 
 

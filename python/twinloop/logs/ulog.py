@@ -17,6 +17,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.remarks import Remark, note
 from twinloop.signals import TURNS, Signals, State
+from twinloop.unmeasured import logged
 
 ADDRESS = re.compile(r"([a-z0-9_]+)(?:/([0-9]{1,3}))?\.(\S+)", re.ASCII | re.IGNORECASE)
 """A topic, which of several of that name, and a field: "vehicle_attitude.roll", "sensor_gyro/1.x"."""
@@ -67,6 +68,8 @@ def read_ulog(
 ) -> tuple[Floats, Floats, Floats, tuple[Remark, ...]]:
     """Times (n + 1,) from 0, states (n + 1, n_x) and commands (n, n_u) of a log, a row each period; and remarks on it.
 
+    Where a state that is not measured has no field, the states are those that are.
+
     States are interpolated between the two samples beside each time, commands are those sent last.
 
     Args:
@@ -80,7 +83,8 @@ def read_ulog(
         InvalidInput: a damaged or hostile file, a field that is missing, samples too far apart, or no time in common.
         NotAvailable: the package pyulog is missing.
     """
-    names = (*signals.state_names, *signals.command_names)
+    wanted = logged(signals, columns or ())
+    names = (*(state.name for state in wanted), *signals.command_names)
     fields = _fields(called, names, columns)
     log, cut = _parsed(path, called, sorted({topic for topic, _, _ in fields.values()}))
     found = {name: _samples(log, called, *fields[name]) for name in names}
@@ -89,7 +93,7 @@ def read_ulog(
         _refuse_gaps(called, samples, start, stop, signals.dt)
     count = int((stop - start) / signals.dt + 1e-6)
     times = np.asarray(start + signals.dt * np.arange(count + 1), dtype=np.float64)
-    states = [_interpolated(found[state.name], state, times) for state in signals.states]
+    states = [_interpolated(found[state.name], state, times) for state in wanted]
     commands = [_held(found[name], times[:-1]) for name in signals.command_names]
     remarks = [_ends_early(found.values())] if cut and window.stop is None else []
     return times - start, np.stack(states, axis=1), np.stack(commands, axis=1), tuple(remarks)

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 import twinloop as tl
 from problems import problem_of as one_run
 from twinloop import _core
+from twinloop._ground.slopes import slopes
 from twinloop._ground.streams import Unit
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise
@@ -23,7 +24,6 @@ from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.slopes import slopes
 from twinloop.identification.terms.denominators import denominators, over, quotient
 from twinloop.identification.terms.pool import Pool
 

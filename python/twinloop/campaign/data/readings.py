@@ -53,8 +53,8 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
                 f" ({held.every * signals.dt:.3g} s). So it does on the twin, which learns from new ones alone"
                 " (option reports). If an estimator makes more of it, log that.",
             )
-    for one in derived(records):
-        names = signals.state_names
+    names = signals.state_names
+    for one in (one for one in derived(records) if one.rate not in signals.unmeasured):
         yield note(
             "derived-rate",
             f"{names[one.rate]} is computed from the readings of {names[one.of]}, as a filtered difference of them, and"

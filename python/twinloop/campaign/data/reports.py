@@ -32,6 +32,8 @@ EXACT = 0.02
 """Share by which a slow change may come out of a filter larger or smaller than it is, where it gives a rate."""
 FORGETS = 0.999
 """Share of its last value that such a filter keeps at most."""
+PLAIN = 1e-6
+"""Share of its last value below which such a rate is a plain difference."""
 MOST_ROWS = 0.95
 """Share of the rows in which it has to be so."""
 NOISY = 1e-6
@@ -42,6 +44,8 @@ FEWEST_DERIVED = 12
 
 def reports_in(runs: Sequence[Trajectory], signals: Signals) -> Reports:
     """What is given of readings: repeated ones, and filtered differences of those whose derivatives they should be.
+
+    A state that is not measured is one in any case.
 
     Args:
         runs: that were recorded.
@@ -54,6 +58,11 @@ def reports_in(runs: Sequence[Trajectory], signals: Signals) -> Reports:
     for one in derived(records):
         if found[one.rate] is None and is_rate(one, signals):
             found[one.rate] = Computed(one.of, one.kept, one.share)
+    for i in signals.unmeasured:
+        of = signals.state_names.index(str(signals.states[i].derivative_of))
+        # What is declared needs no noise to show; a log may have filtered it.
+        filtered = isinstance(known := found[i], Computed) and known.kept > PLAIN
+        found[i] = known if filtered else Computed(of, 0.0, 1.0 / signals.dt)
     return tuple(found) if any(found) else ()
 
 

@@ -30,6 +30,7 @@ from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import JITTER, Trajectory, check_recorded
+from twinloop.unmeasured import completed_readings, lacks
 
 LOST = 1.5
 """Periods between two rows from which rows were lost."""
@@ -108,7 +109,7 @@ def check_log(
 
     Args:
         t: times of the rows (n + 1,), s.
-        states: readings (n + 1, n_x), in the units of the signals.
+        states: readings (n + 1, n_x), in the units of the signals; or of those states alone that are measured.
         commands: as sent (n, n_u).
         signals: declared signals.
         lines: of each row in its file, for the sentences; None: they call rows by their index.
@@ -125,6 +126,8 @@ def _checked(
     compared: bool,
 ) -> LogCheck:
     """A log as it was checked; with columns compared with each other, which takes most of the time and gives notes."""
+    if lacks(states, signals):
+        states = completed_readings(states, signals)
     steps = np.diff(t)
     known = steps[np.isfinite(steps)]
     lost = known > LOST * signals.dt

@@ -35,7 +35,7 @@ from twinloop.campaign.identify_and_plan.foretold import features_of, foretold, 
 from twinloop.campaign.identify_and_plan.likeness import Likeness, in_pieces
 from twinloop.campaign.identify_and_plan.neighbours import alike_nearby
 from twinloop.campaign.identify_and_plan.selection import distinct
-from twinloop.campaign.replaying import cut, start_of
+from twinloop.campaign.replaying import whole
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.offsets import moved
@@ -292,7 +292,7 @@ def alone(
         workers: how the work is carried out.
     """
     steps = flight.trajectory.steps
-    flown = cut(flight.replayed, start_of(model, flight.trajectory.states[0]), steps)
+    flown = whole(model, flight, limits, workers)
     runs = drawn_runs(model, flown, limits, workers=workers)
     return None if int(runs.lasted[0]) < steps else (np.asarray(runs.read[0]), np.asarray(runs.commands[0]))
 

@@ -12,8 +12,9 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.replaying import as_flown, lengths_of, missed_by, start_of
+from twinloop.campaign.replaying import as_flown, lengths_of, missed_by
 from twinloop.law.accuracy import squares
+from twinloop.law.beginning import states_read
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
 
@@ -100,7 +101,7 @@ def following(
         states, steps = flight.trajectory.states, flight.trajectory.steps
         frozen[j] = squares(states[1:], held(states, lengths[j]), limits.signals).mean()
         for i, model in enumerate(models):
-            flown = as_flown(model, flight, lengths[j])
+            flown = as_flown(model, flight, lengths[j], limits, workers)
             missed, length = missed_by(model, flown, states[1:], limits, workers)
             lasted[i, j] = length / steps
             free[i, j] = missed.mean() if length == steps else np.inf
@@ -126,11 +127,12 @@ def in_pieces(
     found = np.empty(len(flights))
     for j, flight in enumerate(flights):
         states, commands = flight.trajectory.states, flight.trajectory.commands
+        begun = states_read(model, states, limits.signals)
         most, off, moved = -(-len(commands) // PIECES), 0.0, 0.0
         for first in range(0, len(commands), most):
             piece = commands[first : first + most]
             read = states[first + 1 : first + 1 + len(piece)]
-            flown = Replay(limits.signals, start_of(model, states[first]), piece)
+            flown = Replay(limits.signals, begun[first], piece)
             missed, length = missed_by(model, flown, read, limits, workers)
             off += float(missed.sum()) if length == len(piece) else np.inf
             moved += float(squares(read, states[first], limits.signals).sum())

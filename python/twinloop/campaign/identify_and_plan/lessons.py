@@ -15,6 +15,7 @@ from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of
 from twinloop.campaign.identify_and_plan.elsewhere import elsewhere
+from twinloop.campaign.identify_and_plan.outputs_alone import outputs_alone
 from twinloop.campaign.identify_and_plan.selection import Selected, shortened
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.logbook import Logbook
@@ -69,6 +70,9 @@ def lesson_of(
             *identified.remarks,
             *shortened(selected, signals.dt),
             *stand_ins(identified.actuation, signals, explained),
+            *outputs_alone(
+                identified.actuation, [run.trajectory for run in book.experiments], signals, explained
+            ),
             *levels_said(identified.model, signals),
             *from_other_gains(book.experiments),
             *diagnostics_of(book.experiments, signals, book.setup.steps, found),

@@ -179,7 +179,7 @@ def expected_misses(
         seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"), reports)
         runs = drawn_runs(
             model,
-            _begun_as_read(as_flown(model, flight, lengths[j])),
+            _begun_as_read(as_flown(model, flight, lengths[j], limits, workers)),
             limits,
             noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
             disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
@@ -250,7 +250,7 @@ def of_each_state(
     off, frozen = np.empty((2, len(flights), limits.signals.n_x))
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
-        flown = as_flown(model, flight, lengths[j])
+        flown = as_flown(model, flight, lengths[j], limits, workers)
         missed, lasted = missed_by(model, flown, states[1:], limits, workers)
         off[j] = missed.mean(axis=0) if lasted == steps else np.inf
         frozen[j] = squares(states[1:], held(states, lengths[j]), limits.signals).mean(axis=0)

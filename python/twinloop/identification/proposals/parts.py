@@ -76,8 +76,10 @@ def cut(run: Run, signals: Signals, actuation: Actuation) -> list[tuple[Run, Act
         if last - first < SHORTEST:
             continue
         rests = effects[first].tolist() if first else [actuator.rest for actuator in actuation.actuators]
+        # Behind the effects of actuators stand hidden states that commands fill.
         begun = tuple(
-            actuator._replace(rest=rest) for actuator, rest in zip(actuation.actuators, rests, strict=True)
+            actuator._replace(rest=rest)
+            for actuator, rest in zip(actuation.actuators, rests[: signals.n_u], strict=True)
         )
         found.append((run.part(first, last), replace(actuation, actuators=begun)))
     return found

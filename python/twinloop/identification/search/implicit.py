@@ -18,6 +18,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop._ground.slopes import slopes
 from twinloop.identification.search.noise import calm
 from twinloop.identification.search.poles import vanishes_nowhere
 from twinloop.identification.search.problem import Columns, Problem
@@ -25,7 +26,6 @@ from twinloop.identification.search.structure import Sum, prices
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
-from twinloop.identification.slopes import slopes
 from twinloop.identification.terms.denominators import Denominator, above, below, power_of, quotient
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals

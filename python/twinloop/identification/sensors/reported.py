@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop._ground.arrays import Floats, Integers
+from twinloop._ground.slopes import slopes
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.slopes import slopes
 from twinloop.law.reports import Held, Reports, computed, variance
 from twinloop.signals import Signals
 

@@ -1,0 +1,108 @@
+"""Outputs alone: states that go on moving as they moved, whose rates nobody has declared.
+
+In its changes x[k + 1] − x[k] a mass shows its momentum: the change before foretells the next one far better than
+states and commands do. Of what has none, a tank or a heater, these say it all. Where noise hides the change over a
+period, longer ones show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from twinloop._ground.arrays import Floats
+from twinloop.law.actuation import Actuation
+from twinloop.remarks import Remark, note
+from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
+
+FORETELLS = 10.0
+"""Times that changes are off more, mean squares, where the change before is not known."""
+FEWEST = 20
+"""Changes of all runs at least."""
+STRIDES = (1, 4, 16)
+"""Periods over which changes are taken."""
+
+
+def outputs_alone(
+    actuation: Actuation, runs: Sequence[Trajectory], signals: Signals, explained: bool
+) -> Iterator[Remark]:
+    """Which states go on moving without a declared rate, where something hidden stands for it, or no law explains them.
+
+    Args:
+        actuation: of the law.
+        runs: that it was learnt from.
+        signals: of the system.
+        explained: whether the law explains the flights.
+    """
+    stands_in = {state for hidden in actuation.stored for state in hidden.states}
+    bodies = () if signals.kinematics is None else signals.kinematics.rates
+    alone = [
+        i
+        for i in signals.driven
+        if signals.states[i].derivative_of is None and signals.state_names[i] not in bodies
+    ]
+    going = [
+        signals.state_names[i]
+        for i in alone
+        if (not explained or i in stands_in) and momentum(runs, i, signals) > FORETELLS
+    ]
+    if going:
+        names, several = ", ".join(going), len(going) > 1
+        yield note(
+            "outputs-alone",
+            f"{names} {'go' if several else 'goes'} on moving as in the period before, and no state is declared as"
+            f" {'their rates' if several else 'its rate'}. Log {'them' if several else 'it'}, or declare lags=1 in the"
+            " signals: then a rate is made of past readings, and its law is learnt instead of what stands in for it.",
+        )
+
+
+def momentum(runs: Sequence[Trajectory], state: int, signals: Signals) -> float:
+    """Times that changes of a state are off more where the one before is not known, mean squares; 1: it says nothing.
+
+    Args:
+        runs: as recorded.
+        state: its place.
+        signals: of the system.
+    """
+    return max(_momentum(runs, state, signals, stride) for stride in STRIDES)
+
+
+def _momentum(runs: Sequence[Trajectory], state: int, signals: Signals, stride: int) -> float:
+    """The same of changes over so many periods."""
+    wanted, known, before = [], [], []
+    for run in runs:
+        count = run.steps // stride
+        if count < 2:
+            continue
+        states = signals.continued(run.states, run.states[0])[: count * stride + 1 : stride]
+        sent = run.commands[: count * stride].reshape(count, stride, -1).mean(axis=1)
+        changes = np.diff(states[:, state])
+        wanted.append(changes[1:])
+        before.append(changes[:-1])
+        known.append(np.column_stack([states[1:-1], sent[1:], sent[:-1]]))
+    if sum(map(len, wanted)) < FEWEST:
+        return 1.0
+    columns = [*np.concatenate(known).T]
+    change, last = _left([np.concatenate(wanted), np.concatenate(before)], columns)
+    (rest,) = _left([change], [last])
+    least = float(np.square(rest).sum())
+    return float(np.square(change).sum()) / least if least > 0.0 else 1.0
+
+
+def _left(wanted: Sequence[Floats], columns: Sequence[Floats]) -> list[Floats]:
+    """What no sum of a constant and columns explains (Gram and Schmidt)."""
+    left, basis = (
+        [values - values.mean() for values in wanted],
+        [column - column.mean() for column in columns],
+    )
+    for place, column in enumerate(basis):
+        size = float(np.square(column).sum())
+        if size <= 1e-12 * float(np.square(columns[place]).sum()):
+            continue
+        left = [values - column * (float((column * values).sum()) / size) for values in left]
+        basis[place + 1 :] = [
+            other - column * (float((column * other).sum()) / size) for other in basis[place + 1 :]
+        ]
+    return left
