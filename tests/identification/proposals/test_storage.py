@@ -140,6 +140,37 @@ def test_a_load_behind_a_spring_is_a_pair_that_turns():
     assert within < 2e-3 and within < 0.02 * without
 
 
+def back_emf(seed, noise=1.0):
+    """A pendulum on a motor whose current lags by 0.15 s behind its voltage, less what its speed induces."""
+    stream = np.random.default_rng([seed, 77])
+    start = [stream.uniform(-0.4, 0.4), 0.0, 0.0]
+    commands = held(stream, 300, -1.0, 1.0, 6)
+
+    def slope(x, u):
+        return np.array(
+            [x[1], 4.0 * x[2] - 9.0 * np.sin(x[0]) - 0.5 * x[1], (u[0] - x[2] - 0.8 * x[1]) / 0.15]
+        )
+
+    states = integrated(slope, start, commands, DRIVEN.dt, steps=20)[:, :2]
+    return Run.of(states + noise * np.array([3e-4, 2e-3]) * stream.normal(size=states.shape), commands)
+
+
+DRIVEN = tl.Signals(
+    [tl.State("angle", "rad", 1.0), tl.State("speed", "rad/s", 2.5, derivative_of="angle")],
+    [tl.Command("voltage", "V", (-1.0, 1.0))],
+    0.04,
+)
+
+
+def test_what_is_stored_is_found_that_a_lasting_disturbance_would_explain():
+    found = learnt([back_emf(seed) for seed in (1, 2)], DRIVEN)
+    current = found.actuation.hidden
+    assert {(state.commands, state.states) for state in current} == {((0,), ()), ((), (1,))}
+    assert [state.time for state in current] == pytest.approx([0.15, 0.15], rel=0.03)
+    assert all(actuator.lag == 0.0 for actuator in found.actuation.actuators)
+    assert missed(found, DRIVEN, back_emf) < 2e-3
+
+
 def swinging(seed):
     return swung(gravity, seed, noise=1e-3)
 

@@ -23,7 +23,7 @@ from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.hidden import filled, with_hidden, without_hidden
-from twinloop.identification.search.noise import still
+from twinloop.identification.search.noise import first_noise, lasts, still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search, search_known, usable_among
@@ -48,6 +48,8 @@ STEPS = 4
 """Such factors at most, one after the other."""
 NEAR = 2
 """Single states, the best ones, beside which another source is tried."""
+FEW = 2
+"""Kinds of storage that are followed up where they are looked for as if nothing disturbed."""
 AT_ONCE = 24
 """Hidden states of which inner products are computed at once."""
 STORED = 50
@@ -69,9 +71,26 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("hidden")
     # Behind a short memory of noisy readings their noise would explain itself.
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
+    better = False
+    for told in _told(context, bare):
+        better |= told.evidence > hypothesis.evidence
+        yield told
+    if not better:
+        for variant in _undisturbed(context, bare):
+            yield from _told(context, variant, brief=True)
+
+
+def _told(context: Context, bare: Hypothesis, brief: bool = False) -> Iterator[Hypothesis]:
+    """A hypothesis with the best hidden states that motion fills, beside its lags and in their place, fitted.
+
+    Args:
+        context: of the identification.
+        bare: without such states.
+        brief: as for `filled_by_motion`.
+    """
     screens = [Screen.of(context, variant) for variant in (bare, *_at_once(context, bare))]
     for screen in screens:
-        for found in filled_by_motion(screen):
+        for found in filled_by_motion(screen, brief):
             # What is stored in place of a lag describes more than the lag alone, or all that is fitted is in vain.
             if screen is not screens[0] and not found.evidence > screens[0].plain.evidence:
                 continue
@@ -94,7 +113,7 @@ def shows(hidden: Sequence[HiddenState], period: float) -> bool:
     return all(one.time >= max(period, SWINGING * one.turns) for one in hidden if one.states)
 
 
-def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
+def filled_by_motion(screen: Screen, brief: bool = False) -> Iterator[Hypothesis]:
     """The hypothesis of a screen, not fitted, with the best storage of each kind; none that does not pay at all.
 
     Kinds are what one state fills, empty or settled at the start, and pairs of each time that is tried. A pair
@@ -102,6 +121,7 @@ def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
 
     Args:
         screen: of a hypothesis with sums to begin with, and without such states.
+        brief: whether no pairs are tried that turn into each other, and of the other kinds only the few that show best.
     """
     context = screen.context
     longest = context.signals.dt * max(len(run.commands) for run in screen.hypothesis.runs)
@@ -119,7 +139,7 @@ def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
         pairs = screen(pair for one in near for pair in _pairs(context, one, others, time))
         kinds.append((screen, pairs, ()))
     swings = screen.beside()
-    for begins in (False, True):
+    for begins in (False, True) if not brief else ():
         swinging = swings(
             pair
             for place in _sources(context)
@@ -133,6 +153,8 @@ def filled_by_motion(screen: Screen) -> Iterator[Hypothesis]:
         )
         if found.evidence > without.evidence
     ]
+    if brief:
+        showing = sorted(showing, key=lambda kind: kind[1].evidence.length)[:FEW]
     # Which one shows on the terms that there are; whether there is one, when all may change.
     for of_kind, found, factors in showing:
         plain, grown = screen.plain, of_kind.with_all_terms(_timed(of_kind, found, factors))
@@ -145,6 +167,15 @@ def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     actuation, direct = hypothesis.actuation, Actuation.direct(context.signals)
     if context.may_lag and actuation.actuators != direct.actuators:
         yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
+
+
+def _undisturbed(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The same with the noise of a fit without lasting disturbances, if there are any: they hide what is stored."""
+    problem, terms = Problem(context, hypothesis), hypothesis.candidates.ladder[0]
+    if any(lasts(problem, found.chain) for found in hypothesis.sums):
+        chains = [first_noise(problem, found.chain, terms, gusts=False) for found in hypothesis.sums]
+        sums = zip(hypothesis.sums, chains, strict=True)
+        yield replace(hypothesis, sums=tuple(replace(found, chain=chain) for found, chain in sums))
 
 
 def _timed(screen: Screen, best: Hypothesis, factors: Sequence[float]) -> Hypothesis:

@@ -39,6 +39,12 @@ def calm(problem: Problem, chain: Chain) -> Chain:
     return chain if moved <= CALM * float(chain.sensors[0]) else chain.with_noise(chain.sensors, slow)
 
 
+def lasts(problem: Problem, chain: Chain) -> bool:
+    """Whether a lasting disturbance moves a chain by more than its sensors' noise would hide in a period."""
+    period = problem.dt if chain.integrated else 1.0
+    return chain.motion.correlated * period * period > CALM * float(chain.sensors[0])
+
+
 def still(problem: Problem, chains: Iterable[Chain]) -> bool:
     """Whether hardly anything disturbs some chains: terms leave their sensors' noise alone."""
     return all(calm(problem, chain) is chain for chain in chains)
