@@ -109,6 +109,15 @@ class Differences:
         return state
 
 
+def in_words(signals: Signals) -> list[str]:
+    """How each state is made that is not measured, for a program that has to."""
+    names, dt = signals.state_names, signals.dt
+    return [
+        f"{names[i]} is not measured: ({names[of]} - {names[of]} a period before) / {dt:g} s, 0 in the first period"
+        for i, of in _sources(signals)
+    ]
+
+
 def _among(measured: Floats, signals: Signals) -> Floats:
     """Values of all states (…, n_x), those that are not measured 0."""
     values = np.zeros((*measured.shape[:-1], signals.n_x))

@@ -12,7 +12,9 @@ from lives import THOROUGH
 from oracles import same_bits
 from twinloop.campaign.examination.log_check import check_log
 from twinloop.contracts import check_system
+from twinloop.faces.sheet import sheet
 from twinloop.guard import Guard
+from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.reports import Computed
 from twinloop.logs import write_columns
 
@@ -190,6 +192,9 @@ def test_a_log_without_the_rate_is_loaded_checked_and_identified(tmp_path):
     found = check_log(loaded.t, loaded.states, loaded.commands, SIGNALS)
     assert found.fit and [column.name for column in found.columns] == ["angle", "angle_rate", "torque"]
     assert "derived-rate" not in [remark.code for remark in found.remarks]
+    checked = invoke("check", str(files[0]), str(tmp_path / "rig.toml"), "-o", str(tmp_path / "same.csv"))
+    assert checked.exit_code == 0, checked.output
+    assert same_bits(tl.load(tmp_path / "same.csv", SIGNALS).states, loaded.states)
     done = invoke("identify", *map(str, files), "--config", str(tmp_path / "rig.toml"), "--json")
     assert done.exit_code == 0, done.output
     assert "sin(angle)" in done.stdout
@@ -215,3 +220,16 @@ def test_a_log_with_a_column_for_the_rate_is_taken_as_it_is(tmp_path):
     with pytest.raises(tl.InvalidInput, match="angle is missing"):
         write_columns(path, {"t": run.t, "angle_rate": true[:, 1], "torque": run.commands[:, 0]})
         tl.load(path, SIGNALS)
+
+
+def test_a_person_is_told_how_the_rate_is_made_and_what_to_record(tmp_path):
+    campaign = tl.Campaign(
+        SIGNALS, controller=PID, initial_state=[0.0], target_state=[1.2], duration=1.0, progress=None
+    )
+    made = "angle_rate is not measured: (angle - angle a period before) / 0.05 s, 0 in the first period"
+    text = sheet("rig.db", campaign.test(GAINS), None, "rig-test-0.csv", campaign.setup)
+    assert f"{made}.\nRecord t, angle, torque, then:" in text
+    family = PID.bind(SIGNALS)
+    genes = family.genes(GAINS)
+    header, _ = controller_c(PID, family, genes, "loop")
+    assert f"   {made}\n" in header and f"# {made}\n" in controller_python(PID, family, genes)

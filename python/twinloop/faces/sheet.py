@@ -19,6 +19,7 @@ from twinloop.planning.quality import quality_unit
 from twinloop.remarks import Remark
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+from twinloop.unmeasured import in_words
 
 ROWS = 10
 """Of the predicted run on a sheet, after the first; the file has all."""
@@ -237,6 +238,8 @@ def sheet(
     lines += band_leaves(signals, predicted)
     lines += not_reliable(store, against)
     lines.append(reason(test, predicted is not None))
-    lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
+    lines += [f"{one}." for one in in_words(signals)]
+    read = [signals.state_names[i] for i in signals.measured]
+    lines.append(f"Record t, {', '.join((*read, *signals.command_names))}, then:")
     lines.append(f"  {to_type('tell', store, test.number, 'FLIGHT.csv')}")
     return "\n".join(lines) + "\n"

@@ -12,6 +12,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.controllers import PID, Cascade, Family, Mixer, StateFeedback, UnboundFamily
 from twinloop.errors import NotAvailable
 from twinloop.signals import Signals
+from twinloop.unmeasured import in_words
 
 DECIMAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)")
 """A number with a point or an exponent, as Python writes it."""
@@ -224,6 +225,7 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
         "",
         "import math",
         "",
+        *(f"# {one}" for one in in_words(signals)),
         f"STATES = {signals.state_names!r}",
         f"COMMANDS = {signals.command_names!r}",
         f"GAINS = {family.parameters(genes)!r}",
@@ -270,7 +272,8 @@ def controller_c(
     )
     header = "\n".join([
         f"/* A controller tuned by Twinloop {__version__}: one call a period of {signals.dt:g} s, no allocation.",
-        f"   States: {', '.join(signals.state_names)}", f"   Commands: {', '.join(signals.command_names)}",
+        f"   States: {', '.join(signals.state_names)}", *(f"   {one}" for one in in_words(signals)),
+        f"   Commands: {', '.join(signals.command_names)}",
         "   Gains:", *gains, "*/",
         f"#ifndef {big}_H", f"#define {big}_H", "",
         f"typedef {precision} {name}_real;", "",
