@@ -91,6 +91,8 @@ def hint(annotation):
     """A type as text, without the modules that it comes from."""
     annotation = getattr(annotation, "__forward_arg__", annotation)
     text = annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
+    # A field that is an argument alone is one of its type.
+    text = re.sub(r"^InitVar\[(.*)\]$", r"\1", text)
     return re.sub(r"\b(?:\w+\.)+(?=\w)|\b_(?=[A-Z])", "", text)
 
 
