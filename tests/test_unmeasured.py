@@ -109,6 +109,7 @@ def test_a_record_with_all_columns_and_what_is_no_record_stay():
     assert completed(whole, known) is whole
     assert completed(flight(np.ones((4, 3))), known).states.shape == (4, 3)
     assert completed("nothing", known) == "nothing"
+    assert not lacks([[1.0, 2.0], [1.0]], known)
     plain = tl.Signals([tl.State("x", "m", 1.0)], [COMMAND], 0.1)
     assert not lacks(np.ones(1), plain) and lacks([1.0, 2.0], known) and not lacks(1.0, known)
 

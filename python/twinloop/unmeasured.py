@@ -13,8 +13,13 @@ from twinloop.signals import Signals, State
 
 def lacks(values: ArrayLike, signals: Signals) -> bool:
     """Whether states or readings (…, columns) have columns for those states alone that are measured."""
-    shape = np.shape(values)
-    return bool(shape) and shape[-1] == len(signals.measured) != signals.n_x
+    if not signals.unmeasured:
+        return False
+    try:
+        shape = np.shape(values)
+    except ValueError:  # of rows that differ: what reads them says so
+        return False
+    return bool(shape) and shape[-1] == len(signals.measured)
 
 
 def logged(signals: Signals, there: Collection[str]) -> tuple[State, ...]:

@@ -264,10 +264,8 @@ class Controller:
             InvalidInput: another shape, or a number that is not finite; the memory is unchanged.
         """
         signals = self.family.signals
-        goal = completed_state("Target", target, signals)
-        reading = floats("State", state, (None,))
-        if not lacks(reading, signals):
-            return self._law.command(floats("State", reading, (signals.n_x,)), goal)
+        columns = len(signals.measured) if lacks(state, signals) else signals.n_x
+        reading, goal = floats("State", state, (columns,)), completed_state("Target", target, signals)
         return self._law.command(self._differences.completed(reading), goal)
 
     def commands(self, states: Floats, targets: Floats) -> Floats:
