@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import same_bits
 from twinloop.trajectory import Trajectory, completed, recorded_as
-from twinloop.unmeasured import Differences, completed_state, lacks, logged
+from twinloop.unmeasured import Differences, completed_state, in_words, lacks, logged
 
 COMMAND = tl.Command("torque", "N m", (-1.0, 1.0))
 
@@ -51,13 +51,20 @@ def test_a_rate_is_made_of_what_is_measured():
     assert found.unmeasured == (1,) and found.measured == (0, 2)
 
 
-def test_states_that_have_a_derivative_and_angles_of_a_body_get_no_rate():
+def test_states_that_have_a_derivative_or_are_one_get_no_rate():
     pair = [tl.State("x", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="x")]
-    assert tl.Signals(pair, [COMMAND], 0.1, lags=1).state_names == ("x", "v", "v_rate")
+    assert tl.Signals([*pair, tl.State("y", "m", 1.0)], [COMMAND], 0.1, lags=1).state_names == (
+        "x",
+        "v",
+        "y",
+        "y_rate",
+    )
+    with pytest.raises(tl.InvalidInput, match="a state whose rate is not declared, found none"):
+        tl.Signals(pair, [COMMAND], 0.1, lags=1)
     names = ("roll", "pitch", "yaw", "p", "q", "r")
     body = tl.RigidBody(names[:3], names[3:])
-    known = tl.Signals([tl.State(n, "rad", 1.0) for n in names], [COMMAND], 0.1, kinematics=body, lags=1)
-    assert known.state_names[6:] == ("p_rate", "q_rate", "r_rate")
+    with pytest.raises(tl.InvalidInput, match="found none"):
+        tl.Signals([tl.State(n, "rad", 1.0) for n in names], [COMMAND], 0.1, kinematics=body, lags=1)
 
 
 def test_what_is_made_of_the_past_is_declared_from_then_on():
@@ -94,8 +101,17 @@ def test_rates_of_a_record_are_differences_and_begin_as_the_first_one(rows):
 def test_rates_of_a_flight_begin_as_its_test_does(rows):
     start = np.array([0.3, 0.0, -2.0, 0.5])
     states = completed(flight(rows), signals(), start).states
-    assert states[0, 2:].tolist() == [-2.0, 0.5]
+    for rate in (0, 1):
+        changes = np.diff(np.array(rows)[:, rate]) / 0.1
+        far = abs(changes[0] - start[2 + rate]) > 3.0 * np.abs(np.diff(changes)).max()
+        assert states[0, 2 + rate] == (changes[0] if far else start[2 + rate])
     assert same_bits(states[1:, 2:], np.diff(np.array(rows), axis=0) / 0.1)
+
+
+def test_a_flight_that_began_in_motion_is_no_test_from_rest():
+    ticks = 0.1 * np.arange(12)
+    moving = flight(np.column_stack([0.7 * ticks, 0.5 * ticks**2]))
+    assert completed(moving, signals(), np.zeros(4)).states[0, 2:].tolist() == pytest.approx([0.7, 0.0])
 
 
 def test_an_angle_that_wraps_turns_by_the_short_way():
@@ -132,7 +148,8 @@ def test_readings_one_by_one_are_completed_as_a_flight_from_rest_is(rows):
     differences = Differences(known)
     for _ in range(2):
         found = [differences.completed(np.array(row)) for row in rows]
-        assert same_bits(np.array(found), completed(flight(rows), known, np.zeros(4)).states)
+        assert same_bits(np.array(found)[1:], completed(flight(rows), known).states[1:])
+        assert found[0].tolist() == [*rows[0], 0.0, 0.0]
         differences.reset()
 
 
@@ -145,6 +162,12 @@ def test_a_log_has_columns_of_all_states_or_of_those_that_are_measured():
 
 def test_a_record_is_known_again_with_what_it_lacks():
     known = signals()
-    told = completed(flight([(0.1, 1.0), (0.2, 1.5), (0.4, 2.0)]), known, np.array([0.0, 0.0, 0.7, 0.0]))
+    told = completed(flight([(0.1, 1.0), (0.2, 1.5), (0.4, 2.0)]), known, np.array([0.0, 0.0, 0.7, 5.0]))
+    assert told.states[0, 2:].tolist() == [0.7, 5.0]
     assert recorded_as(flight([(0.1, 1.0), (0.2, 1.5), (0.4, 2.0)]), told, known)
     assert not recorded_as(flight([(0.1, 1.0), (0.2, 1.5), (0.4, 2.1)]), told, known)
+
+
+def test_how_the_rate_of_an_angle_that_wraps_is_made_is_said_with_the_short_way():
+    (plain, _), (wrapping, _) = in_words(signals()), in_words(signals(periodic=True))
+    assert "the short way" in wrapping and "the short way" not in plain

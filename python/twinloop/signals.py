@@ -176,12 +176,13 @@ class Signals(Value, Recorded, kind="signals"):
         dt: period, s; a command is held for one period.
         kinematics: which states are angles and body rates of a rigid body, if there are any.
         lags: past readings of which the rest of the state may be made, where only outputs are measured. From 1 on, each
-            state that has no derivative gets its rate, as `angle_rate` of `angle`, a state that is not measured. More
-            than one adds nothing: rates of rates are noise, and what else is hidden the preset `default` looks for.
+            state that has no derivative and is none gets its rate, as `angle_rate` of `angle`, a state that is not
+            measured. More than one adds nothing: rates of rates are noise, and what else is hidden the preset `default`
+            looks for.
 
     Raises:
-        InvalidInput: no states or no commands, a name used twice, a `derivative_of` or `kinematics` that do not fit, or
-            lags that are no whole number.
+        InvalidInput: no states or no commands, a name used twice, a `derivative_of` or `kinematics` that do not fit,
+            lags that are no whole number, or no state whose rate they could give.
     """
 
     states: Sequence[State]
@@ -195,7 +196,7 @@ class Signals(Value, Recorded, kind="signals"):
         object.__setattr__(self, "commands", _members("commands", Command, self.commands))
         object.__setattr__(self, "dt", number("Signals, dt (s)", self.dt, above=0.0))
         if whole("Signals, lags", lags):
-            object.__setattr__(self, "states", (*self.states, *self._rates()))
+            self._append_rates()
         names = self.state_names + self.command_names
         for name in names:
             if names.count(name) > 1:
@@ -213,9 +214,10 @@ class Signals(Value, Recorded, kind="signals"):
                     raise unknown("state in the kinematics", name, self.state_names)
             self._check_turned(self.kinematics)
 
-    def _rates(self) -> list[State]:
-        """Rates, not measured, of the states whose motion is learnt."""
-        return [
+    def _append_rates(self) -> None:
+        """Appends rates, not measured, of states that are learnt and are rates of nothing themselves."""
+        turning = () if self.kinematics is None else self.kinematics.rates
+        rates = [
             State(
                 f"{state.name}_rate",
                 _a_second(state.unit),
@@ -224,7 +226,14 @@ class Signals(Value, Recorded, kind="signals"):
                 measured=False,
             )
             for state in (self.states[i] for i in self._learnt)
+            if state.derivative_of is None and state.name not in turning
         ]
+        if not rates:
+            raise InvalidInput(
+                "Signals, lags: expected a state whose rate is not declared, found none; leave lags out, or leave out"
+                " the rates that no sensor reads."
+            )
+        object.__setattr__(self, "states", (*self.states, *rates))
 
     def _check_turned(self, body: RigidBody) -> None:
         """Refuses angles of a body that have a derivative besides: body rates already say how they turn."""
@@ -245,7 +254,9 @@ class Signals(Value, Recorded, kind="signals"):
             if of is None:
                 continue
             if of not in parents:
-                raise unknown(f"state that {name!r} is the derivative of,", of, parents)
+                raise unknown(
+                    f"state that {name!r} is the derivative of,", of, [*filter(name.__ne__, parents)]
+                )
             if integrals.count(of) > 1:
                 raise InvalidInput(
                     f"Signals: expected at most one derivative of {of!r}, found several; "

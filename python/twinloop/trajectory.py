@@ -16,7 +16,7 @@ from twinloop.errors import AtRow, InvalidInput, unknown
 from twinloop.records import Recorded
 from twinloop.records.reading import MOST_ITEMS
 from twinloop.signals import Signals
-from twinloop.unmeasured import completed_readings, lacks
+from twinloop.unmeasured import completed_readings, lacks, or_measured
 
 Run = TypeVar("Run")
 ENDINGS = ("completed", "aborted", "diverged")
@@ -109,7 +109,8 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
     ):
         if found != expected:
             raise InvalidInput(
-                f"Trajectory: expected {expected} {what} as in the signals, found {found}; check the columns."
+                f"Trajectory: expected {expected} {what}{or_measured(signals) if what == 'states' else ''} as in the"
+                f" signals, found {found}; check the columns."
             )
     if trajectory.steps < least:
         raise InvalidInput(

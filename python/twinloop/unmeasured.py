@@ -10,6 +10,11 @@ from numpy.typing import ArrayLike
 from twinloop._ground.arrays import Floats, floats
 from twinloop.signals import Signals, State
 
+FIRST = 10
+"""Changes at the start of a run that say by how much they differ from period to period."""
+FAR = 3.0
+"""Times that by which the first one may be off the rate that a run was to begin with."""
+
 
 def lacks(values: ArrayLike, signals: Signals) -> bool:
     """Whether states or readings (…, columns) have columns for those states alone that are measured."""
@@ -40,13 +45,19 @@ def completed_readings(readings: Floats, signals: Signals, start: Floats | None 
     Args:
         readings: of those that are measured, in their order.
         signals: of the system.
-        start: the state that the run was to start from (n_x,); None: nobody knows, and a rate begins as the first
-            change says.
+        start: the state that the run was to start from (n_x,); None: nobody knows.
+
+    Returns:
+        The readings (n + 1, n_x). A rate begins as the start has it, or as the first change says where nobody knows, or
+        where it is so far off that the run began in motion.
     """
     states = _among(readings, signals)
     for i, of in _sources(signals):
-        states[1:, i] = _change(states[1:, of], states[:-1, of], of, signals)
-        states[:1, i] = start[i] if start is not None else states[1:2, i].sum()
+        changes = _change(states[1:, of], states[:-1, of], of, signals)
+        states[1:, i] = changes
+        begun = float(changes[0]) if len(changes) else 0.0
+        usual = float(np.abs(np.diff(changes[:FIRST])).max(initial=0.0))
+        states[0, i] = begun if start is None or abs(begun - start[i]) > FAR * usual else start[i]
     return states
 
 
@@ -61,9 +72,14 @@ def completed_state(what: str, values: ArrayLike, signals: Signals) -> Floats:
     Raises:
         InvalidInput: another shape, or numbers that are not finite.
     """
-    lacking = lacks(values, signals)
-    found = floats(what, values, (len(signals.measured) if lacking else signals.n_x,))
-    return _among(found, signals) if lacking else found
+    if lacks(values, signals):
+        return _among(floats(what, values, (len(signals.measured),)), signals)
+    return floats(f"{what}{or_measured(signals)}", values, (signals.n_x,))
+
+
+def or_measured(signals: Signals) -> str:
+    """What an error adds where measured states alone would do as well."""
+    return f" (or the {len(signals.measured)} that are measured)" if signals.unmeasured else ""
 
 
 def completed_rows(what: str, rows: ArrayLike, signals: Signals) -> Floats:
@@ -116,9 +132,10 @@ class Differences:
 
 def in_words(signals: Signals) -> list[str]:
     """How each state is made that is not measured, for a program that has to."""
-    names, dt = signals.state_names, signals.dt
+    names, dt, wrapping = signals.state_names, signals.dt, [i for i, _ in signals.periods]
     return [
-        f"{names[i]} is not measured: ({names[of]} - {names[of]} a period before) / {dt:g} s, 0 in the first period"
+        f"{names[i]} is not measured: ({names[of]} - {names[of]} a period before) / {dt:g} s"
+        f"{', the difference taken the short way' if of in wrapping else ''}, 0 in the first period"
         for i, of in _sources(signals)
     ]
 

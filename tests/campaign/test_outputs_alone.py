@@ -17,6 +17,7 @@ from twinloop.guard import Guard
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.reports import Computed
 from twinloop.logs import write_columns
+from twinloop.trajectory import completed
 
 DT, NOISE = 0.05, 1e-3
 SIGNALS = tl.Signals(
@@ -178,6 +179,38 @@ def test_the_guard_is_given_readings_alone():
     assert same_bits(flown.states[1:, 1], np.diff(flown.states[:, 0]) / DT)
 
 
+def test_flown_blind_the_guard_expects_what_the_twin_simulates(twin):
+    bound = PID.bind(SIGNALS)
+    test = tl.Test(bound, bound.genes(GAINS), np.zeros(2), np.array([1.0, 0.0]), 30)
+    guard = Guard(test, [1.5], twin=twin, clock=None)
+    sent = [guard.command([0.0], test.target(0))]
+    expected = []
+    for _ in range(12):
+        sent.append(guard.command([np.nan], test.target(0)))
+        expected.append(guard._estimate)
+    states = twin.simulate_commands([0.0], np.array(sent)).true_states
+    np.testing.assert_allclose(np.array(expected), states[2:], atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def coarse(twin):
+    """The same twin, whose flights were read by an encoder of 1 mrad."""
+    run, _ = logged(1)
+    rounded = completed(tl.Trajectory(run.t, 1e-3 * np.round(run.states / 1e-3), run.commands), SIGNALS)
+    return tl.Twin(twin.model, SIGNALS, [], members=twin.members, noise=twin.noise, flights=[rounded])
+
+
+@pytest.mark.parametrize(("target", "trips"), [(0.0, False), (1.0, True)])
+def test_the_guard_lets_an_encoder_rest_where_the_twin_does(coarse, target, trips):
+    bound = PID.bind(SIGNALS)
+    test = tl.Test(bound, bound.genes(GAINS), np.zeros(2), np.array([target, 0.0]), 60)
+    guard = Guard(test, [0.0], twin=coarse, clock=None)
+    for _ in range(60):
+        guard.command([0.0], test.target(0))
+    assert guard.tripped is trips
+    assert ("band" in guard.reason) is trips, guard.reason
+
+
 def test_a_log_without_the_rate_is_loaded_checked_and_identified(tmp_path):
     (tmp_path / "rig.toml").write_text(
         RIG + "[options]\n" + "".join(f"{k} = {json.dumps(v)}\n" for k, v in THOROUGH.items())
@@ -198,6 +231,36 @@ def test_a_log_without_the_rate_is_loaded_checked_and_identified(tmp_path):
     done = invoke("identify", *map(str, files), "--config", str(tmp_path / "rig.toml"), "--json")
     assert done.exit_code == 0, done.output
     assert "sin(angle)" in done.stdout
+
+
+def test_some_rates_without_the_others_are_refused(tmp_path):
+    two = tl.Signals([tl.State("q1", "rad", 1.0), tl.State("q2", "rad", 1.0)], SIGNALS.commands, DT, lags=1)
+    path = tmp_path / "some.csv"
+    names = ("t", "q1", "q2", "q2_rate", "torque")
+    write_columns(path, {name: DT * np.arange(9.0) for name in names})
+    with pytest.raises(tl.InvalidInput, match="found q2_rate without q1_rate"):
+        tl.load(path, two)
+
+
+def counted(steps, seed):
+    """What an encoder of 0.2 mm reads of a cart that comes to rest, and what was sent."""
+    stream, state, read, sent = np.random.default_rng(seed), np.zeros(2), [], []
+    for k in range(steps + 1):
+        read.append(2e-4 * np.round(state[0] / 2e-4))
+        if k < steps:
+            force = 0.6 * stream.uniform() if k < steps // 3 else 0.0
+            sent.append([force])
+            state = solve_ivp(
+                lambda t, x, u=force: [x[1], 9.0 * u - 6.0 * x[1]], (0.0, DT), state, rtol=1e-9
+            ).y[:, -1]
+    return tl.Trajectory(DT * np.arange(steps + 1), np.array(read)[:, np.newaxis], np.array(sent))
+
+
+def test_a_rate_that_is_made_does_not_freeze_where_an_encoder_comes_to_rest():
+    cart = tl.Signals([tl.State("pos", "m", 0.5)], [tl.Command("force", "N", (-1.0, 1.0))], DT, lags=1)
+    run = counted(120, 0)
+    found = check_log(run.t, run.states, run.commands, cart)
+    assert found.fit, [str(remark) for remark in found.remarks]
 
 
 def test_a_log_is_known_again(tmp_path):

@@ -400,10 +400,10 @@ def test_a_sensor_whose_flights_repeat_readings_is_not_taken_for_frozen():
     from twinloop.guard.sensors import SensorWatch
 
     still = tl.Trajectory(0.05 * np.arange(31), np.zeros((31, 2)), np.zeros((30, 1)))
-    watch = SensorWatch(np.ones(2), [still])
+    watch = SensorWatch(np.ones(2), [still], read=[0, 1], banded=False)
     assert not any([watch.frozen(np.zeros(2)).any() for _ in range(50)])
     assert any([watch.frozen(np.zeros(2)).any() for _ in range(21)])
-    without = SensorWatch(np.ones(2), [])
+    without = SensorWatch(np.ones(2), [], read=[0, 1], banded=False)
     assert not any([without.frozen(np.zeros(2)).any() for _ in range(500)])
 
 

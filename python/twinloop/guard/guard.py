@@ -18,11 +18,12 @@ from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard.band import BandWatch
 from twinloop.guard.sensors import SensorWatch
+from twinloop.law.reports import sensed
 from twinloop.law.twin import Twin
 from twinloop.signals import Bounds, Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
-from twinloop.unmeasured import Differences, completed_state
+from twinloop.unmeasured import Differences, completed_state, or_measured
 
 HORIZON = 0.2
 """Share of a test's length that is looked ahead where no horizon is given."""
@@ -90,11 +91,17 @@ class Guard:
         # A periodic state turns up at any number of turns; those around the middle are those that the bounds mean.
         self._middle = np.array([0.0 if np.isinf(low) else 0.5 * (low + high) for low, high in bounds])
         self._half = np.array([0.5 * (high - low) for low, high in bounds])
-        self._ahead = None if twin is None or not self.horizon else _look_ahead(test, twin, bounds)
+        self._ahead = self._blind = None
+        if twin is not None and self.horizon:
+            members = list(twin.members or (twin.model,))
+            self._ahead = _look_ahead(test, twin, members, bounds)
+            # Flown blind it goes on from what it expected, in which a rate must not be half a period old.
+            self._blind = _look_ahead(test, twin, [sensed(members[0])], bounds)
         drawn = twin is not None and twin.members and twin.noise is not None
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
         limits = Limits(self.signals) if limits is None else limits
-        self._sensors = SensorWatch(limits.readings, () if twin is None else twin.flights)
+        known = () if twin is None else twin.flights
+        self._sensors = SensorWatch(limits.readings, known, self.signals.measured, self._band is not None)
         self._controller = test.controller()
         self._differences = Differences(self.signals)
         self._states = np.empty((test.steps + 1, n_x))
@@ -117,8 +124,9 @@ class Guard:
         self._sensors.reset()
         if isinstance(self.fallback, Controller):
             self.fallback.reset()
-        if self._ahead is not None:
-            self._ahead.reset()
+        for each in (self._ahead, self._blind):
+            if each is not None:
+                each.reset()
         if self._band is not None:
             self._band.reset()
 
@@ -146,7 +154,8 @@ class Guard:
         reading = self._differences.completed(reading)
         if reading.shape != (self.signals.n_x,):
             raise InvalidInput(
-                f"Guard.command, state: expected {self.signals.n_x} numbers, found shape {reading.shape}."
+                f"Guard.command, state: expected {self.signals.n_x} numbers{or_measured(self.signals)}, found shape"
+                f" {reading.shape}."
             )
         goal = completed_state("Guard.command, target", target, self.signals)
         own = None
@@ -168,11 +177,12 @@ class Guard:
         else:
             command = self.fallback.copy()
         self._estimate = reading
-        if self._ahead is not None:
-            ahead = self._ahead.following(reading, command)
+        if self._ahead is not None and self._blind is not None:
+            ahead = self._blind.following(reading, command)
             # Flown blind for long a twin may diverge: then the last reading that was believed is the better guess.
             self._estimate = np.where(np.abs(ahead) <= self._sensors.farthest, ahead, reading)
-            self._ahead.sent(reading, goal, command)
+            for each in (self._ahead, self._blind):
+                each.sent(reading, goal, command)
         self.period += 1
         return command
 
@@ -331,11 +341,12 @@ def _sendable(signals: Signals) -> list[tuple[str, Bounds]]:
     return [(command.name, command.bounds) for command in signals.commands]
 
 
-def _look_ahead(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> _core.LookAhead:
-    members = twin.members or (twin.model,)
+def _look_ahead(
+    test: Test, twin: Twin, members: Sequence[_core.Model], bounds: list[tuple[float, float]]
+) -> _core.LookAhead:
     try:
         return _core.LookAhead(
-            list(members),
+            members,
             twin.limits.setting(test.family.engine),
             test.genes,
             test.target_state,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.rounding import on_grid
 from twinloop.trajectory import Trajectory
 
 LONGER = 2
@@ -22,11 +23,20 @@ class SensorWatch:
     Args:
         farthest: magnitude of each state (n_x,) beyond which no reading is recorded: such a one is none.
         flights: recorded before, which say how long each sensor repeats itself; none: no sensor is taken for frozen.
+        read: which states a sensor reads (n_x,); what is made of readings does not freeze.
+        banded: whether a band shows, too, that a sensor froze: then one that rounds, and repeats itself at rest for as
+            long as that lasts, is left to it.
     """
 
-    def __init__(self, farthest: Floats, flights: Sequence[Trajectory]) -> None:
+    def __init__(
+        self, farthest: Floats, flights: Sequence[Trajectory], read: Sequence[int], banded: bool
+    ) -> None:
         n_x = len(farthest)
         self.farthest = farthest
+        self.watched = np.isin(np.arange(n_x), read)
+        if banded and flights:
+            readings = np.concatenate([flight.states for flight in flights])
+            self.watched &= np.array([on_grid(column) == 0.0 for column in readings.T])
         longest = np.zeros(n_x, np.int64)
         for flight in flights:
             longest = np.maximum(longest, _longest(flight.states))
@@ -47,7 +57,10 @@ class SensorWatch:
         """States (n_x,) whose sensor is frozen, with this reading, the next one of the flight."""
         self.repeated[:] = np.where(reading == self.last, self.repeated + 1, 0)
         self.last[:] = reading
-        return np.zeros(len(reading), bool) if self.limit is None else self.repeated >= self.limit
+        if self.limit is None:
+            return np.zeros(len(reading), bool)
+        found: NDArray[np.bool_] = self.watched & (self.repeated >= self.limit)
+        return found
 
 
 def _longest(states: Floats) -> np.ndarray:

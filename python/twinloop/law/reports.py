@@ -64,6 +64,12 @@ def with_reports(model: _core.Model, reports: Reports) -> _core.Model:
     return model.with_reports(held, computed)
 
 
+def sensed(model: _core.Model) -> _core.Model:
+    """The same model with sensors for the rates that are computed of readings."""
+    held, computed_ = model.reports
+    return model.with_reports(held, []) if computed_ else model
+
+
 def given(reports: Reports, readings: Floats) -> Floats:
     """What is given of readings, or of the noise in them.
 

@@ -304,7 +304,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         key = id(test), id(flown)
         if key not in self._free_runs:
             # With both of them: as long as they are here, their numbers are nobody else's.
-            self._free_runs[key] = test, flown, self._simulated(self.as_flown(test, flown))
+            whole = completed(flown, self.signals, test.initial_state)
+            self._free_runs[key] = test, flown, self._simulated(self.as_flown(test, whole))
         return self._free_runs[key][2]
 
     def began(self, flown: Trajectory) -> Floats:
@@ -355,7 +356,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         period of a run.
 
         Args:
-            states: (n_x,) or (rows, n_x), SI units, radians.
+            states: (n_x,) or (rows, n_x), SI units, radians; true ones, while a rate that a record computes of readings
+                is half a period old.
             commands: (n_u,) or (rows, n_u), in their units.
             past: earlier commands of the run, (p, n_u) or, one run per row, (rows, p, n_u), the oldest first, in the
                 commands' units; None: none yet.
@@ -434,7 +436,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
             InvalidInput: shapes that do not fit.
             NotAvailable: no finite derivatives there, or a discrete law without `discrete=True`.
         """
-        state = floats("State to linearise at", at, (self.signals.n_x,))
+        state = completed_state("State to linearise at", at, self.signals)
         if command is None:
             point = trimmed(self.law, state, resting(self.law))
         else:

@@ -258,6 +258,13 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         ) from reason
     names = [name.strip() for name in rows[0][1]] if rows else []
     states_read = [state.name for state in logged(signals, names)]
+    rates = [state.name for state in signals.states if not state.measured and state.name in names]
+    if rates and len(states_read) < signals.n_x:
+        lacking = [state.name for state in signals.states if not state.measured and state.name not in names]
+        raise InvalidInput(
+            f"Log {called}: expected columns of all rates that are not measured, or of none, found {', '.join(rates)}"
+            f" without {', '.join(lacking)}; remove or add columns."
+        )
     wanted = (TIME, *states_read, *signals.command_names)
     twice = next((name for name in wanted if names.count(name) > 1), None)
     if twice is not None:

@@ -34,7 +34,9 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
         runs: that were recorded.
         signals: of the system.
     """
-    for i, state in enumerate(signals.states):
+    # What is made of readings has no sensor of its own.
+    sensors = [(i, signals.states[i]) for i in signals.measured]
+    for i, state in sensors:
         frozen = sum(froze(run.states[:, i]) for run in runs)
         if frozen:
             yield serious(
@@ -44,7 +46,7 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
                 " stop; remove these rows.",
             )
     records = [run.states for run in runs]
-    for i, state in enumerate(signals.states):
+    for i, state in sensors:
         held = repeats([states[:, i] for states in records])
         if held is not None:
             yield note(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.rounding import count
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.law.reports import Computed, Held, Reports
 from twinloop.signals import Signals
@@ -24,10 +25,6 @@ DERIVED = 1e-3
 """Share of what noise adds to a rate by which it may be off what another's readings say, if it is computed of them."""
 AS_LARGE = 2.0
 """Ratio of noise in differences of two orders, at most."""
-ON_GRID = 1e-6
-"""Share of a count, or of what it is counted from, by which readings of a sensor that rounds may be off."""
-REPEATED = 0.5
-"""Share of its readings that differ at most, of a sensor that rounds."""
 EXACT = 0.02
 """Share by which a slow change may come out of a filter larger or smaller than it is, where it gives a rate."""
 FORGETS = 0.999
@@ -154,21 +151,6 @@ def derived(records: Sequence[Floats]) -> Iterator[Derived]:
             passed = DERIVED * found.share * float(noise[j])
             if left[int(MOST_ROWS * len(left))] < passed and found.kept < FORGETS:
                 yield found
-
-
-def count(records: Sequence[Floats]) -> float:
-    """What a rounded sensor's reading changes by at least, 0 for one that is not: hardly any of its readings repeats.
-
-    Args:
-        records: of one state, a run each (n + 1,).
-    """
-    readings = np.concatenate(records)
-    values = np.unique(readings)
-    if not 1 < len(values) < REPEATED * len(readings):
-        return 0.0
-    least = float(np.diff(values).min())
-    steps = (values - values[0]) / least
-    return least if bool((np.abs(steps - np.round(steps)) < ON_GRID * np.maximum(steps, 1.0)).all()) else 0.0
 
 
 def scatters(records: Sequence[Floats]) -> bool:
