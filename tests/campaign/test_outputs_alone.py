@@ -11,9 +11,11 @@ from command import invoke
 from lives import THOROUGH
 from oracles import same_bits
 from twinloop.campaign.examination.log_check import check_log
+from twinloop.campaign.identify_and_plan.outputs_alone import outputs_alone
 from twinloop.contracts import check_system
 from twinloop.faces.sheet import sheet
 from twinloop.guard import Guard
+from twinloop.law.actuation import Actuation, Actuator, HiddenState
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.reports import Computed
 from twinloop.logs import write_columns
@@ -296,3 +298,33 @@ def test_a_person_is_told_how_the_rate_is_made_and_what_to_record(tmp_path):
     genes = family.genes(GAINS)
     header, _ = controller_c(PID, family, genes, "loop")
     assert f"   {made}\n" in header and f"# {made}\n" in controller_python(PID, family, genes)
+
+
+ALONE = tl.Signals([tl.State("angle", "rad", 3.0)], SIGNALS.commands, DT)
+BARE = Actuation.direct(ALONE)
+LAGGING = Actuation((Actuator(lag=0.5),))
+FILLED = Actuation(BARE.actuators, (HiddenState((0,), False, 0.0, 1.0),))
+STORED = Actuation(BARE.actuators, (HiddenState((), False, 0.0, 1.0, states=(0,)),))
+
+
+def tank(seed):
+    """A level that what flows in moves at once."""
+    commands = np.repeat(np.random.default_rng(seed).uniform(0.0, 2.0, (40, 1)), 5, axis=0)
+    level = [1.0]
+    for (inflow,) in commands:
+        level.append(level[-1] + DT * (inflow - np.sqrt(level[-1])))
+    return tl.Trajectory(DT * np.arange(201), np.array(level)[:, np.newaxis], commands)
+
+
+@pytest.mark.parametrize(
+    ("actuation", "explained", "said"),
+    [(BARE, True, 0), (BARE, False, 1), (LAGGING, True, 1), (FILLED, True, 1), (STORED, True, 1)],
+)
+def test_a_mass_without_a_rate_is_pointed_out_where_something_stands_for_it(actuation, explained, said):
+    mass, still = [logged(1)[0], logged(2)[0]], [tank(1), tank(2)]
+    found = list(outputs_alone(actuation, mass, ALONE, explained))
+    assert [remark.code for remark in found] == ["outputs-alone"] * said
+    assert all("lags=1" in remark.sentence and not remark.serious for remark in found)
+    assert not list(outputs_alone(actuation, still, ALONE, explained))
+    declared = [completed(run, SIGNALS) for run in mass]
+    assert not list(outputs_alone(actuation, declared, SIGNALS, explained))

@@ -19,6 +19,10 @@ from twinloop.trajectory import Trajectory
 
 FORETELLS = 10.0
 """Times that changes are off more, mean squares, where the change before is not known."""
+LONG = 5.0
+"""Periods beyond which a lag may stand for the rate of a mass."""
+MOVES = 0.05
+"""Share of changes, mean squares, that states and commands leave unexplained at least where something has momentum."""
 FEWEST = 20
 """Changes of all runs at least."""
 STRIDES = (1, 4, 16)
@@ -28,7 +32,7 @@ STRIDES = (1, 4, 16)
 def outputs_alone(
     actuation: Actuation, runs: Sequence[Trajectory], signals: Signals, explained: bool
 ) -> Iterator[Remark]:
-    """Which states go on moving without a declared rate, where something hidden stands for it, or no law explains them.
+    """Which states go on moving without a declared rate, where something may stand for it, or no law explains them.
 
     Args:
         actuation: of the law.
@@ -36,6 +40,10 @@ def outputs_alone(
         signals: of the system.
         explained: whether the law explains the flights.
     """
+    # What commands fill may stand for a rate, too, and so may a long lag of theirs.
+    by_commands = any(not hidden.states for hidden in actuation.hidden) or any(
+        actuator.lag > LONG * signals.dt for actuator in actuation.actuators
+    )
     stands_in = {state for hidden in actuation.stored for state in hidden.states}
     bodies = () if signals.kinematics is None else signals.kinematics.rates
     alone = [
@@ -46,15 +54,14 @@ def outputs_alone(
     going = [
         signals.state_names[i]
         for i in alone
-        if (not explained or i in stands_in) and momentum(runs, i, signals) > FORETELLS
+        if (not explained or by_commands or i in stands_in) and momentum(runs, i, signals) > FORETELLS
     ]
     if going:
-        names, several = ", ".join(going), len(going) > 1
         yield note(
             "outputs-alone",
-            f"{names} {'go' if several else 'goes'} on moving as in the period before, and no state is declared as"
-            f" {'their rates' if several else 'its rate'}. Log {'them' if several else 'it'}, or declare lags=1 in the"
-            " signals: then a rate is made of past readings, and its law is learnt instead of what stands in for it.",
+            f"The motion of {', '.join(going)} goes on as in the period before, and no rate of it is declared:"
+            " something hidden or a lag may stand for that. Log the rate, or declare lags=1 in the signals, which makes"
+            " it of past readings.",
         )
 
 
@@ -84,11 +91,13 @@ def _momentum(runs: Sequence[Trajectory], state: int, signals: Signals, stride: 
         known.append(np.column_stack([states[1:-1], sent[1:], sent[:-1]]))
     if sum(map(len, wanted)) < FEWEST:
         return 1.0
-    columns = [*np.concatenate(known).T]
-    change, last = _left([np.concatenate(wanted), np.concatenate(before)], columns)
+    columns, whole = [*np.concatenate(known).T], np.concatenate(wanted)
+    change, last = _left([whole, np.concatenate(before)], columns)
     (rest,) = _left([change], [last])
-    least = float(np.square(rest).sum())
-    return float(np.square(change).sum()) / least if least > 0.0 else 1.0
+    unexplained, least = float(np.square(change).sum()), float(np.square(rest).sum())
+    if least <= 0.0 or unexplained < MOVES * float(np.square(whole - whole.mean()).sum()):
+        return 1.0
+    return unexplained / least
 
 
 def _left(wanted: Sequence[Floats], columns: Sequence[Floats]) -> list[Floats]:
