@@ -168,6 +168,16 @@ def test_a_record_is_known_again_with_what_it_lacks():
     assert not recorded_as(flight([(0.1, 1.0), (0.2, 1.5), (0.4, 2.1)]), told, known)
 
 
+def test_what_is_wrong_with_the_signals_is_said_as_it_is_without_past_readings():
+    angle = tl.State("angle", "rad", 1.0)
+    with pytest.raises(tl.InvalidInput, match=r"twinloop\.RigidBody or None"):
+        tl.Signals([angle], [COMMAND], 0.1, kinematics="body", lags=1)
+    with pytest.raises(tl.InvalidInput, match="found 'angle' twice"):
+        tl.Signals([angle, angle], [COMMAND], 0.1, lags=1)
+    with pytest.raises(tl.InvalidInput, match="found 'angle_rate' twice"):
+        tl.Signals([angle], [tl.Command("angle_rate", "rad/s", (-1.0, 1.0))], 0.1, lags=1)
+
+
 def test_how_the_rate_of_an_angle_that_wraps_is_made_is_said_with_the_short_way():
     (plain, _), (wrapping, _) = in_words(signals()), in_words(signals(periodic=True))
     assert "the short way" in wrapping and "the short way" not in plain

@@ -195,14 +195,7 @@ class Signals(Value, Recorded, kind="signals"):
         object.__setattr__(self, "states", _members("states", State, self.states))
         object.__setattr__(self, "commands", _members("commands", Command, self.commands))
         object.__setattr__(self, "dt", number("Signals, dt (s)", self.dt, above=0.0))
-        if whole("Signals, lags", lags):
-            self._append_rates()
-        names = self.state_names + self.command_names
-        for name in names:
-            if names.count(name) > 1:
-                raise InvalidInput(
-                    f"Signals: expected names that differ, found {name!r} twice; rename one of them."
-                )
+        self._check_names()
         self._check_derivatives()
         if self.kinematics is not None:
             if not isinstance(self.kinematics, RigidBody):
@@ -213,10 +206,20 @@ class Signals(Value, Recorded, kind="signals"):
                 if name not in self.state_names:
                     raise unknown("state in the kinematics", name, self.state_names)
             self._check_turned(self.kinematics)
+        if whole("Signals, lags", lags):
+            self._append_rates()
+            self._check_names()
+
+    def _check_names(self) -> None:
+        names = self.state_names + self.command_names
+        for name in names:
+            if names.count(name) > 1:
+                raise InvalidInput(
+                    f"Signals: expected names that differ, found {name!r} twice; rename one of them."
+                )
 
     def _append_rates(self) -> None:
-        """Appends rates, not measured, of states that are learnt and are rates of nothing themselves."""
-        turning = () if self.kinematics is None else self.kinematics.rates
+        """Appends rates, not measured, of the states that lack one."""
         rates = [
             State(
                 f"{state.name}_rate",
@@ -225,8 +228,7 @@ class Signals(Value, Recorded, kind="signals"):
                 derivative_of=state.name,
                 measured=False,
             )
-            for state in (self.states[i] for i in self._learnt)
-            if state.derivative_of is None and state.name not in turning
+            for state in (self.states[i] for i in self.without_rates)
         ]
         if not rates:
             raise InvalidInput(
@@ -311,15 +313,22 @@ class Signals(Value, Recorded, kind="signals"):
     @cached_property
     def driven(self) -> tuple[int, ...]:
         """States whose motion is learnt: all except integrals of other states and angles of a rigid body."""
-        return self._learnt
-
-    @property
-    def _learnt(self) -> tuple[int, ...]:
-        """The same of the states that there are so far."""
         given = {state.derivative_of for state in self.states}
         if self.kinematics is not None:
             given |= set(self.kinematics.angles)
         return tuple(i for i, name in enumerate(self.state_names) if name not in given)
+
+    @property
+    def without_rates(self) -> tuple[int, ...]:
+        """States that are no rates, and of which none is declared."""
+        body = self.kinematics
+        turned = () if body is None else (*body.angles, *body.rates)
+        known = {*turned, *(state.derivative_of for state in self.states)}
+        return tuple(
+            i
+            for i, state in enumerate(self.states)
+            if state.derivative_of is None and state.name not in known
+        )
 
     @cached_property
     def unmeasured(self) -> tuple[int, ...]:

@@ -27,6 +27,17 @@ def lacks(values: ArrayLike, signals: Signals) -> bool:
     return bool(shape) and shape[-1] == len(signals.measured)
 
 
+def columns_of(values: ArrayLike, signals: Signals) -> int:
+    """How many columns states or readings should have: one for each state, or for each that is measured."""
+    return len(signals.measured) if lacks(values, signals) else signals.n_x
+
+
+def names_of(values: ArrayLike, signals: Signals) -> tuple[str, ...]:
+    """Names of the states that columns of states or readings are of."""
+    names = signals.state_names
+    return tuple(names[i] for i in signals.measured) if lacks(values, signals) else names
+
+
 def logged(signals: Signals, there: Collection[str]) -> tuple[State, ...]:
     """States of which a log has columns: all of them, or those alone that are measured.
 
@@ -52,7 +63,7 @@ def completed_readings(readings: Floats, signals: Signals, start: Floats | None 
         where it is so far off that the run began in motion.
     """
     states = _among(readings, signals)
-    for i, of in _sources(signals):
+    for i, of in sources(signals):
         changes = _change(states[1:, of], states[:-1, of], of, signals)
         states[1:, i] = changes
         begun = float(changes[0]) if len(changes) else 0.0
@@ -72,9 +83,8 @@ def completed_state(what: str, values: ArrayLike, signals: Signals) -> Floats:
     Raises:
         InvalidInput: another shape, or numbers that are not finite.
     """
-    if lacks(values, signals):
-        return _among(floats(what, values, (len(signals.measured),)), signals)
-    return floats(f"{what}{or_measured(signals)}", values, (signals.n_x,))
+    found = floats(f"{what}{or_measured(signals)}", values, (columns_of(values, signals),))
+    return _among(found, signals) if lacks(found, signals) else found
 
 
 def or_measured(signals: Signals) -> str:
@@ -124,7 +134,7 @@ class Differences:
             return reading
         state, last = _among(reading, signals), self._last
         if last is not None:
-            for i, of in _sources(signals):
+            for i, of in sources(signals):
                 state[i] = _change(state[of], last[of], of, signals)
         self._last = state
         return state
@@ -136,7 +146,7 @@ def in_words(signals: Signals) -> list[str]:
     return [
         f"{names[i]} is not measured: ({names[of]} - {names[of]} a period before) / {dt:g} s"
         f"{', the difference taken the short way' if of in wrapping else ''}, 0 in the first period"
-        for i, of in _sources(signals)
+        for i, of in sources(signals)
     ]
 
 
@@ -147,7 +157,7 @@ def _among(measured: Floats, signals: Signals) -> Floats:
     return values
 
 
-def _sources(signals: Signals) -> Sequence[tuple[int, int]]:
+def sources(signals: Signals) -> Sequence[tuple[int, int]]:
     """Places of states that are not measured, and of what each is the derivative of."""
     names = signals.state_names
     return [(i, names.index(str(signals.states[i].derivative_of))) for i in signals.unmeasured]

@@ -179,6 +179,7 @@ def test_the_guard_is_given_readings_alone():
     flown = guard.trajectory(state[:1])
     assert flown.ended == "completed" and flown.states.shape == (31, 2)
     assert same_bits(flown.states[1:, 1], np.diff(flown.states[:, 0]) / DT)
+    assert same_bits(guard.trajectory(state[:1]).states, flown.states)
 
 
 def test_flown_blind_the_guard_expects_what_the_twin_simulates(twin):

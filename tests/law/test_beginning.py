@@ -11,7 +11,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop.law.beginning import FIRST, start_of, states_read
 from twinloop.law.flight import fly
-from twinloop.law.reports import Computed, with_reports
+from twinloop.law.reports import Computed, slopes_of, with_reports
 
 SIGNALS = tl.Signals(
     [tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],
@@ -80,3 +80,12 @@ def test_where_no_rate_keeps_the_model_from_diverging_the_slope_stays():
 def test_a_record_without_a_period_begins_as_it_was_read():
     read, commands = record()
     assert same_bits(start_of(MODEL, read[:1], commands[:0], LIMITS), read[0])
+
+
+def test_slopes_of_an_angle_that_wraps_know_no_jumps():
+    wrapping = tl.Signals(
+        [tl.State("angle", "rad", 3.0, periodic=True), *SIGNALS.states[1:]], SIGNALS.commands, SIGNALS.dt
+    )
+    turns = np.column_stack([0.3 * np.arange(30.0), np.zeros(30)])
+    jumping = turns - 2.0 * np.pi * np.round(turns / (2.0 * np.pi))
+    np.testing.assert_allclose(slopes_of(jumping, (None, Computed(0, 0.0, 20.0)), wrapping)[1], 6.0)

@@ -30,7 +30,7 @@ from twinloop.planning.quality import KINDS, Quality, quality_of, weights_of
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.signals import Signals
 from twinloop.test import checked_target
-from twinloop.unmeasured import completed_rows, completed_state, lacks
+from twinloop.unmeasured import columns_of, completed_rows, completed_state, lacks
 
 MOST_STEPS = 10_000_000
 """Of a test in a record."""
@@ -311,7 +311,7 @@ def _sampled(reference: Callable[[float], ArrayLike], signals: Signals, steps: i
     """A function of time at the start of every period, and at the end of the last (steps + 1, its columns)."""
     times = [k * signals.dt for k in range(steps + 1)]
     values = [reference(t) for t in times]
-    columns = len(signals.measured) if lacks(values[0], signals) else signals.n_x
+    columns = columns_of(values[0], signals)
     rows = zip(times, values, strict=True)
     return np.array([floats(f"Campaign, target_state({t:g} s)", row, (columns,)) for t, row in rows])
 

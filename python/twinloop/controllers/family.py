@@ -19,7 +19,7 @@ from twinloop._ground.values import Value
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import Signals
-from twinloop.unmeasured import Differences, completed_state, lacks
+from twinloop.unmeasured import Differences, columns_of, completed_state
 
 AT_A_BOUND = 0.01
 """Share of its range within which a gain counts as at a bound."""
@@ -264,8 +264,8 @@ class Controller:
             InvalidInput: another shape, or a number that is not finite; the memory is unchanged.
         """
         signals = self.family.signals
-        columns = len(signals.measured) if lacks(state, signals) else signals.n_x
-        reading, goal = floats("State", state, (columns,)), completed_state("Target", target, signals)
+        reading = floats("State", state, (columns_of(state, signals),))
+        goal = completed_state("Target", target, signals)
         return self._law.command(self._differences.completed(reading), goal)
 
     def commands(self, states: Floats, targets: Floats) -> Floats:

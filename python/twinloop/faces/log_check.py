@@ -16,7 +16,7 @@ from twinloop.faces.files import check_writable
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.text import table
 from twinloop.logs import TIME, Window, read_log, write_columns
-from twinloop.unmeasured import lacks, logged
+from twinloop.unmeasured import columns_of, names_of
 
 
 @click.command()
@@ -42,8 +42,7 @@ def check(
     read = read_log(log, signals, None, read_fields(config), Window(start, stop))
     rows, name = len(read.t), f"Log {log}"
     t = _numbers(f"{name}, t", read.t, np.shape(read.t)[:1])
-    measured = len(signals.measured) if lacks(read.states, signals) else signals.n_x
-    states = _numbers(f"{name}, states", read.states, (rows, measured))
+    states = _numbers(f"{name}, states", read.states, (rows, columns_of(read.states, signals)))
     commands = _numbers(f"{name}, commands", read.commands, (max(0, rows - 1), signals.n_u))
     found = check_log(t, states, commands, signals, read.lines)
     found = dataclasses.replace(found, remarks=(*read.remarks, *found.remarks))
@@ -53,8 +52,7 @@ def check(
     else:
         click.echo(_text(log, found), nl=False)
     if output is not None:
-        logged_states = logged(signals, () if measured < signals.n_x else signals.state_names)
-        columns = dict(zip((state.name for state in logged_states), states.T, strict=True))
+        columns = dict(zip(names_of(states, signals), states.T, strict=True))
         columns |= dict(zip(signals.command_names, commands.T, strict=True))
         write_columns(output, {TIME: t, **columns})
         click.echo(f"Log: {output}", err=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -91,12 +92,7 @@ class Guard:
         # A periodic state turns up at any number of turns; those around the middle are those that the bounds mean.
         self._middle = np.array([0.0 if np.isinf(low) else 0.5 * (low + high) for low, high in bounds])
         self._half = np.array([0.5 * (high - low) for low, high in bounds])
-        self._ahead = self._blind = None
-        if twin is not None and self.horizon:
-            members = list(twin.members or (twin.model,))
-            self._ahead = _look_ahead(test, twin, members, bounds)
-            # Flown blind it goes on from what it expected, in which a rate must not be half a period old.
-            self._blind = _look_ahead(test, twin, [sensed(members[0])], bounds)
+        self._aheads = [] if twin is None or not self.horizon else _look_aheads(test, twin, bounds)
         drawn = twin is not None and twin.members and twin.noise is not None
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
         limits = Limits(self.signals) if limits is None else limits
@@ -124,9 +120,8 @@ class Guard:
         self._sensors.reset()
         if isinstance(self.fallback, Controller):
             self.fallback.reset()
-        for each in (self._ahead, self._blind):
-            if each is not None:
-                each.reset()
+        for ahead in self._aheads:
+            ahead.reset()
         if self._band is not None:
             self._band.reset()
 
@@ -177,12 +172,12 @@ class Guard:
         else:
             command = self.fallback.copy()
         self._estimate = reading
-        if self._ahead is not None and self._blind is not None:
-            ahead = self._blind.following(reading, command)
+        if self._aheads:
+            next_one = self._aheads[-1].following(reading, command)
             # Flown blind for long a twin may diverge: then the last reading that was believed is the better guess.
-            self._estimate = np.where(np.abs(ahead) <= self._sensors.farthest, ahead, reading)
-            for each in (self._ahead, self._blind):
-                each.sent(reading, goal, command)
+            self._estimate = np.where(np.abs(next_one) <= self._sensors.farthest, next_one, reading)
+        for ahead in self._aheads:
+            ahead.sent(reading, goal, command)
         self.period += 1
         return command
 
@@ -224,8 +219,9 @@ class Guard:
                 " first."
             )
         states = self._states[: n + 1].copy()
-        own = self._differences.completed(np.asarray(last, dtype=np.float64))
-        states[n] = floats("Guard, last reading", own, (self.signals.n_x,))
+        # Whoever asks again is told the same: the memory of the flight does not move on.
+        reading = copy.copy(self._differences).completed(np.asarray(last, dtype=np.float64))
+        states[n] = floats("Guard, last reading", reading, (self.signals.n_x,))
         if ended_at is not None:
             ended, reason = "aborted", self.reason
         elif n < steps:
@@ -271,9 +267,9 @@ class Guard:
             return self._trip(
                 f"readings were outside of the twin's band for too long, {count} periods in a row now"
             )
-        if self._ahead is not None and self.period < self.test.steps:
+        if self._aheads and self.period < self.test.steps:
             near = self.signals.continued(reading[np.newaxis], self._middle)[0]
-            found = self._ahead.leaving(near, self.horizon)
+            found = self._aheads[0].leaving(near, self.horizon)
             self._leaving = 0 if found is None else self._leaving + 1
             if found is not None and (self._leaving >= CERTAIN or found[0] < CERTAIN):
                 seconds = found[0] * self.signals.dt
@@ -339,6 +335,18 @@ def _safe(fallback: Controller | ArrayLike, signals: Signals) -> Controller | Fl
 def _sendable(signals: Signals) -> list[tuple[str, Bounds]]:
     """Names and bounds of the commands."""
     return [(command.name, command.bounds) for command in signals.commands]
+
+
+def _look_aheads(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> list[_core.LookAhead]:
+    """What says whether a flight is about to leave, and what says, last, what is read next where a reading is missing.
+
+    They are one, unless rates are computed of readings. Flown blind a guard goes on from what it expected, in which a
+    rate must not be half a period old.
+    """
+    members = list(twin.members or (twin.model,))
+    blind = sensed(members[0])
+    several = [members] if blind is members[0] else [members, [blind]]
+    return [_look_ahead(test, twin, each, bounds) for each in several]
 
 
 def _look_ahead(

@@ -13,9 +13,8 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
-from twinloop._ground.slopes import slopes
 from twinloop.law.flight import drawn_runs
-from twinloop.law.reports import computed, reports_of
+from twinloop.law.reports import computed, reports_of, slopes_of
 from twinloop.signals import Signals
 
 FIRST = 12
@@ -33,14 +32,12 @@ def states_read(model: _core.Model, readings: Floats, signals: Signals) -> Float
 
     Args:
         model: that they are states of.
-        readings: of the record (n + 1, n_x), periodic states continued.
+        readings: of the record (n + 1, n_x).
         signals: of the system.
     """
     states: Floats = model.states_of(np.ascontiguousarray(readings))
-    for i, report in computed(reports_of(model, signals.n_x)).items():
-        found = slopes(states[:, report.of])
-        if found is not None:
-            states[:, i] = found.at / signals.dt
+    for i, rate in slopes_of(states, reports_of(model, signals.n_x), signals).items():
+        states[:, i] = rate
     return states
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop._ground.slopes import slopes
 from twinloop.signals import Signals
 
 
@@ -148,6 +149,22 @@ def in_words(reports: Reports, signals: Signals) -> list[str]:
                 f"{name} is computed: {kept}{report.share:.6g} times what {of} has changed by as it is read"
             )
     return lines
+
+
+def slopes_of(states: Floats, reports: Reports, signals: Signals) -> dict[int, Floats]:
+    """Rates that are computed of readings, by place, as slopes (n + 1,) of what they are computed of.
+
+    Args:
+        states: of a record (n + 1, n_x).
+        reports: what is given of readings.
+        signals: of the system.
+
+    Returns:
+        Those that the record is long enough for.
+    """
+    continued = signals.continued(states, states[0])
+    found = {i: slopes(continued[:, report.of]) for i, report in computed(reports).items()}
+    return {i: each.at / signals.dt for i, each in found.items() if each is not None}
 
 
 def variance(report: Computed, of: float) -> float:

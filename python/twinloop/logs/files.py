@@ -20,7 +20,7 @@ from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
-from twinloop.unmeasured import lacks, logged
+from twinloop.unmeasured import logged, names_of
 
 TIME = "t"
 """Name of the column of times, s."""
@@ -63,9 +63,7 @@ class Log:
             InvalidInput: a value that is no number, or columns that are no flight.
         """
         with self.errors():
-            measured = (state.name for state in self.signals.states if state.measured)
-            states = measured if lacks(self.states, self.signals) else self.signals.state_names
-            names = (*states, *self.signals.command_names)
+            names = (*names_of(self.states, self.signals), *self.signals.command_names)
             _refuse_no_number(self.t, names, (self.states, self.commands))
             return Trajectory(self.t, self.states, self.commands, ended=ended, reason=reason)
 

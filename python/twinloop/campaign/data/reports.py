@@ -14,6 +14,7 @@ from twinloop.identification.records import Run, guessed_noise
 from twinloop.law.reports import Computed, Held, Reports
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
+from twinloop.unmeasured import sources
 
 FEWEST = 10
 """Stretches at least in which a sensor repeats itself."""
@@ -55,8 +56,7 @@ def reports_in(runs: Sequence[Trajectory], signals: Signals) -> Reports:
     for one in derived(records):
         if found[one.rate] is None and is_rate(one, signals):
             found[one.rate] = Computed(one.of, one.kept, one.share)
-    for i in signals.unmeasured:
-        of = signals.state_names.index(str(signals.states[i].derivative_of))
+    for i, of in sources(signals):
         # What is declared needs no noise to show; a log may have filtered it.
         filtered = isinstance(known := found[i], Computed) and known.kept > PLAIN
         found[i] = known if filtered else Computed(of, 0.0, 1.0 / signals.dt)

@@ -45,15 +45,9 @@ def outputs_alone(
         actuator.lag > LONG * signals.dt for actuator in actuation.actuators
     )
     stands_in = {state for hidden in actuation.stored for state in hidden.states}
-    bodies = () if signals.kinematics is None else signals.kinematics.rates
-    alone = [
-        i
-        for i in signals.driven
-        if signals.states[i].derivative_of is None and signals.state_names[i] not in bodies
-    ]
     going = [
         signals.state_names[i]
-        for i in alone
+        for i in signals.without_rates
         if (not explained or by_commands or i in stands_in) and momentum(runs, i, signals) > FORETELLS
     ]
     if going:

@@ -13,10 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop._ground.arrays import Floats, Integers
-from twinloop._ground.slopes import slopes
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.chains import Chain
-from twinloop.law.reports import Held, Reports, computed, variance
+from twinloop.law.reports import Held, Reports, computed, slopes_of, variance
 from twinloop.signals import Signals
 
 
@@ -41,11 +40,8 @@ def as_sensed(run: Run, reports: Reports, signals: Signals, ignored: int = 0) ->
             weights[:, i] = 0.0
             weights[read, i] = run.weights[fresh, i]
             states[:, i] = _through(read, run.states[fresh, i], len(states))
-    for i, report in computed(reports).items():
-        found = slopes(states[:, report.of])
-        if found is not None:
-            states[:, i] = found.at / signals.dt
-            weights[:, i] = 0.0
+    for i, rate in slopes_of(states, reports, signals).items():
+        states[:, i], weights[:, i] = rate, 0.0
     return replace(run, states=states, weights=weights, smooth=states)
 
 
