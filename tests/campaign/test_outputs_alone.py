@@ -13,6 +13,7 @@ from oracles import same_bits
 from twinloop.campaign.examination.log_check import check_log
 from twinloop.campaign.identify_and_plan.outputs_alone import outputs_alone
 from twinloop.contracts import check_system
+from twinloop.faces.figures.residuals import autocorrelation, crosscorrelation
 from twinloop.faces.sheet import sheet
 from twinloop.guard import Guard
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
@@ -137,6 +138,10 @@ def test_predictions_of_flights_come_true():
     assert flown < 0.5 * campaign.experiments[0].quality
     assert abs(test.predicted - flown) < max(3.0 * test.spread, 0.02 * flown)
     assert not [remark for remark in campaign.twin.remarks if remark.serious]
+    found = campaign.examine()
+    assert found.autocorrelation.told.tolist() == [True, False]
+    for figure in (autocorrelation(found), crosscorrelation(found)):
+        assert [panel.title for panel in figure.panels] == ["angle"]
 
 
 def test_a_target_that_moves_may_be_given_of_what_is_measured():

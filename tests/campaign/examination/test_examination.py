@@ -65,6 +65,9 @@ def test_white_noise_is_inside_its_limits_99_times_in_100_and_an_echo_is_not():
     found = autocorrelation(echo, 20)
     assert (np.abs(found.values[:, 3]) > found.limit).all()
     assert autocorrelation([np.zeros((50, 2))], 4).values[:, 1:] == pytest.approx(0.0)
+    beside = autocorrelation([np.column_stack([run[:, 0], np.zeros(len(run))]) for run in echo], 20)
+    assert beside.told.tolist() == [True, False]
+    assert beside.outside == autocorrelation([run[:, :1] for run in echo], 20).outside
 
 
 def test_what_a_command_moved_and_the_model_does_not_know_is_found_at_its_lag():

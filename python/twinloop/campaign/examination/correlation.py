@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 
@@ -34,9 +35,15 @@ class Correlations:
     count: int
 
     @property
+    def told(self) -> NDArray[np.bool_]:
+        """Whether each sequence tells anything (...): a constant does not, such as of a rate that no sensor reads."""
+        found: NDArray[np.bool_] = (self.values != 0.0).any(axis=-1)
+        return found
+
+    @property
     def outside(self) -> float:
-        """Share of the coefficients beyond the limits; lag 0 of a sequence with itself does not count."""
-        counted = self.values[..., self.lags > 0.0] if self.lags[0] == 0.0 else self.values
+        """Share beyond the limits of those that tell anything; lag 0 of a sequence with itself does not count."""
+        counted = self.values[self.told][..., self.lags > 0.0]
         return float((np.abs(counted) > self.limit).mean()) if counted.size else 0.0
 
 

@@ -30,6 +30,7 @@ def autocorrelation(found: Examination) -> Figure | None:
             whole=True,
         )
         for i, state in enumerate(found.signals.states)
+        if own.told[i]
     ]
     return Figure(
         "autocorrelation",
@@ -47,6 +48,8 @@ def crosscorrelation(found: Examination) -> Figure | None:
         return None
     panels = []
     for i, state in enumerate(found.signals.states):
+        if not both.told[i].any():
+            continue
         lines = tuple(
             Line(both.lags, both.values[i, j], ROLES[j % len(ROLES)], words(command.name), dots=True)
             for j, command in enumerate(found.signals.commands)
