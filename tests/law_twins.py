@@ -92,19 +92,21 @@ TWINS = {
     "semi-implicit Euler": lambda: twin_of(PENDULUM, "semi-implicit-euler"),
     "semi-implicit Euler, actuators and hidden states": lambda: twin_of(
         FILLED, "semi-implicit-euler", inputs=5, offsets=(0.003, 0.0),
-        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)], hidden=[((0, 1), True, None, 0.7, (), False, 0.0)],
+        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)],
+        hidden=[((0, 1), True, None, 0.7, (), False, 0.0, 0.0, 0.0)],
     ),
     "actuators and hidden states": lambda: twin_of(
         FILLED, inputs=5, offsets=(0.003, 0.0),
-        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)], hidden=[((0, 1), True, None, 0.7, (), False, 0.0)],
+        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)],
+        hidden=[((0, 1), True, None, 0.7, (), False, 0.0, 0.0, 0.0)],
     ),
     "a lag at rest": lambda: twin_of(
         FILLED, inputs=5, actuators=[(0.03, 0, 0.5, 0.0), (0.2, 0, None, 0.0)],
-        hidden=[((1,), False, 0.25, 2.0, (), False, 0.0)],
+        hidden=[((1,), False, 0.25, 2.0, (), False, 0.0, 0.0, 0.0)],
     ),
     "limited rates": lambda: twin_of(
         FILLED, inputs=5, actuators=[(0.08, 1, None, 0.4), (0.0, 0, 0.5, 0.7)],
-        hidden=[((1,), False, 0.25, 2.0, (), False, 0.0)],
+        hidden=[((1,), False, 0.25, 2.0, (), False, 0.0, 0.0, 0.0)],
     ),
     "an angle that wraps": lambda: twin_of(TURNING, signals=WRAPPING),
     "an angle that wraps, step by step": lambda: twin_of(
@@ -126,8 +128,8 @@ TWINS = {
     ),
 }  # fmt: skip
 STORED = [
-    ((0,), False, 0.0, 0.4, (), False, 0.0),
-    ((), False, 0.25, 0.4, (1,), True, 0.0),
+    ((0,), False, 0.0, 0.4, (), False, 0.0, 0.0, 0.0),
+    ((), False, 0.25, 0.4, (1,), True, 0.0, 0.0, 0.0),
 ]
 """A hidden state that a command fills, and one that motion does."""
 

@@ -14,7 +14,7 @@ _Counters = tuple[int, int, int, int, int, int]
 """Seed, iteration, generation, evaluations, spared offspring, generations with a capped archive."""
 _Actuator = tuple[float, int, float | None, float]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
-_Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool, float]
+_Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool, float, float, float]
 """Commands, whether squares fill it, the mean at rest (scaled; None: of the first period), time (s), states that fill
 it where no commands do, whether a run begins with it settled, and in which it turns with its neighbour (s; 0: none)."""
 _Motion = tuple[float, float, float]

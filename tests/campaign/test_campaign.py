@@ -286,7 +286,7 @@ def test_commands_reach_a_twin_through_its_lags_and_hidden_states(pendulum_signa
         "  r4 = r4 - r0\n"
     )
     program = tl._core.Program.parse(text)
-    actuators, hidden = [(0.15, 2, 0.3, 0.0)], [([0], True, None, 0.5, [], False, 0.0)]
+    actuators, hidden = [(0.15, 2, 0.3, 0.0)], [([0], True, None, 0.5, [], False, 0.0, 0.0, 0.0)]
     model = tl._core.Model(program, "acceleration", pendulum_signals.engine, actuators, hidden)
     twin = tl.Twin(model, pendulum_signals)
     flown = twin.simulate(test)

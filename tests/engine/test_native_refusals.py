@@ -300,7 +300,7 @@ def calls(world):
             _core.command_effects,
             {
                 "actuators": w.actuators,
-                "hidden": [([0], True, None, 1.0, [], False, 0.0)],
+                "hidden": [([0], True, None, 1.0, [], False, 0.0, 0.0, 0.0)],
                 "scales": w.command_scales,
                 "dt": w.dt,
                 "commands": w.commands,

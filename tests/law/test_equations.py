@@ -461,7 +461,7 @@ def test_terms_that_share_a_constant_share_a_line_and_its_deviation():
 
 def test_a_hidden_state_has_an_equation_that_sympy_reads():
     program = parsed(5, 1, 6, ["r5 = r4 * 2.0"])
-    hidden = [((0, 1), True, 0.25, 3.0, (), False, 0.0)]
+    hidden = [((0, 1), True, 0.25, 3.0, (), False, 0.0, 0.0, 0.0)]
     model = _core.Model(
         program, "acceleration", SIGNALS.engine, [(0.0, 0, None, 0.0)] * 2, hidden, (0.004, 0.0)
     )

@@ -102,7 +102,7 @@ def test_a_law_gives_its_model_back():
     program = _core.Program.parse(
         program_text(8, 3, 12, [["r8 = r6 * 2.0", "r9 = r7 * r3", "r10 = sin(r0)"]])
     )
-    hidden = [((0,), True, None, 2.0, (), False, 0.0)]
+    hidden = [((0,), True, None, 2.0, (), False, 0.0, 0.0, 0.0)]
     late = (0.01, 0.0, 0.0, 0.0, 0.0, 0.0)
     model = _core.Model(program, "acceleration", BODY.engine, [(0.04, 2, 0.5, 0.0)], hidden, late)
     law = Law.of(model, BODY)

@@ -101,19 +101,22 @@ def test_a_program_of_another_shape_is_no_model(rig):
 @pytest.mark.parametrize(
     "wrong",
     [
-        ([], True, None, 0.3, [], False, 0.0),
-        ([0], True, 0.0, 0.3, [0], False, 0.0),
-        ([0], True, None, 0.3, [], True, 0.0),
-        ([0], True, None, 0.3, [], False, 0.1),
-        ([], True, None, 0.3, [0], False, 0.0),
-        ([], True, 0.0, 0.3, [0], False, -0.1),
-        ([], True, 0.0, 0.3, [9], False, 0.0),
-        ([], True, 0.0, 0.0, [0], False, 0.0),
+        ([], True, None, 0.3, [], False, 0.0, 0.0, 0.0),
+        ([0], True, 0.0, 0.3, [0], False, 0.0, 0.0, 0.0),
+        ([0], True, None, 0.3, [], True, 0.0, 0.0, 0.0),
+        ([0], True, None, 0.3, [], False, 0.1, 0.0, 0.0),
+        ([], True, None, 0.3, [0], False, 0.0, 0.0, 0.0),
+        ([], True, 0.0, 0.3, [0], False, -0.1, 0.0, 0.0),
+        ([], True, 0.0, 0.3, [9], False, 0.0, 0.0, 0.0),
+        ([], True, 0.0, 0.0, [0], False, 0.0, 0.0, 0.0),
     ],
 )
 def test_commands_or_states_fill_a_hidden_state_and_only_states_settle_or_turn_it(rig, wrong):
     program = _core.Program.parse(program_text(5, 2, 7, [["r5 = r4 + 0.0"]]))
-    for right in (([0], True, None, 0.3, [], False, 0.0), ([], False, 0.5, 0.3, [1], True, 0.0)):
+    for right in (
+        ([0], True, None, 0.3, [], False, 0.0, 0.0, 0.0),
+        ([], False, 0.5, 0.3, [1], True, 0.0, 0.0, 0.0),
+    ):
         assert _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2, [right]).hidden == [right]
     with pytest.raises(InvalidInput, match="hidden state: expected"):
         _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2, [wrong])

@@ -8,7 +8,7 @@ import twinloop as tl
 from law_twins import BODY, SIGNALS, STORED, flown, stored_twin, twin_of
 from sameness import same, through_json
 from twinloop.law.actuation import Actuation
-from twinloop.law.exports.augmented import begun
+from twinloop.law.exports.augmented import augmented, begun
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
 
@@ -20,8 +20,18 @@ RNG = np.random.default_rng(4)
 COMMANDS = RNG.uniform([-2.0, 0.0], [2.0, 5.0], (60, 2))
 
 
-SWINGING = [((), False, 0.25, 0.4, (1,), True, 0.11)] * 2
+SWINGING = [((), False, 0.25, 0.4, (1,), True, 0.11, 0.0, 0.0)] * 2
 """Two that turn into each other."""
+
+
+GAP = [((), False, 0.25, 0.4, (1,), False, 0.12, 0.01, 0.05)] * 2
+"""What presses on a mass behind a gap, and its rate."""
+
+
+def pressed(twist, rate, gap=0.01, damping=0.05):
+    """A spring and a damper that never pull, softened where they just touch."""
+    deep = abs(twist) - gap
+    return np.sign(twist) * max(0.0, min(100.0 * deep, deep + damping * np.sign(twist) * rate))
 
 
 def linear_twin(form="acceleration", hidden=STORED):
@@ -72,6 +82,99 @@ def test_two_that_turn_into_each_other_are_a_mass_on_a_spring():
     assert "d hidden_2 / dt = (rate/8) - 0.25 - hidden_2/0.4 + hidden_1/0.11" in text
 
 
+def test_a_mass_behind_a_gap_is_pressed_on_either_side_and_moves_along_at_the_start():
+    twin = linear_twin(hidden=GAP)
+
+    def slope(u):
+        def of(t, y):
+            turning = y[1] / 8.0 - 0.25 - y[3]
+            press = pressed(y[2], turning)
+            acceleration = -3.0 * y[0] - 0.4 * y[1] + 5.0 * u[0] / 2.0 + 2.0 * press - 14.0 * y[3]
+            return [y[1], acceleration, turning, press / 0.12**2 - y[3] / 0.4]
+
+        return of
+
+    found = twin.simulate_commands([0.3, 2.0], COMMANDS).true_states
+    y, presses = np.array([0.3, 2.0, 0.0, 2.0 / 8.0 - 0.25]), []
+    for state, u in zip(found[1:], COMMANDS, strict=True):
+        y = solve_ivp(slope(u), (0.0, SIGNALS.dt), y, rtol=1e-9, atol=1e-11, max_step=1e-3).y[:, -1]
+        presses.append(pressed(y[2], y[1] / 8.0 - 0.25 - y[3]))
+        np.testing.assert_allclose(state, y[:2], atol=3e-2)
+    assert min(presses) < 0.0 and 0.0 in presses
+    text = twin.equations(3)
+    assert "d hidden_1_twist / dt = (rate/8) - 0.25 - hidden_2" in text
+    assert "d hidden_2 / dt = hidden_1/0.0144 - hidden_2/0.4" in text
+    assert "half of which is 0.01" in text and "moves along at the start" in text
+
+
+@pytest.mark.parametrize("rate", [2.0, 4.0, -3.0])
+def test_a_law_with_a_gap_is_linearised_where_the_mass_moves_along(rate):
+    """Pressed on a side by its friction, or free where nothing has to press."""
+    plant = linear_twin(hidden=GAP).linearise([0.2, rate], [0.5, 1.0])
+    assert plant.states[2:4] == ("hidden_1_twist", "hidden_2")
+    twist, along = plant.state[2:4]
+    assert along == pytest.approx(rate / 8.0 - 0.25)
+    press = along * 0.12**2 / 0.4
+    assert twist == pytest.approx(press + np.sign(press) * 0.01)
+    touches = float(press != 0.0)
+    turning = np.array([0.0, 1.0 / 8.0, 0.0, -1.0])
+    pressing = touches * (np.array([0.0, 0.0, 1.0, 0.0]) + 0.05 * turning)
+    np.testing.assert_allclose(plant.A[2], turning)
+    np.testing.assert_allclose(plant.A[3], pressing / 0.12**2 - np.array([0.0, 0.0, 0.0, 2.5]))
+    np.testing.assert_allclose(plant.A[1], 2.0 * pressing + np.array([-3.0, -0.4, 0.0, -14.0]))
+    np.testing.assert_allclose(plant.drift[2:4], 0.0, atol=1e-15)
+
+
+def test_of_small_motions_the_linearisation_of_a_law_with_a_gap_flies_as_the_law_does():
+    twin, at, u = linear_twin(hidden=GAP), np.array([0.2, 4.0]), np.array([0.5, 1.0])
+    plant = twin.linearise(at, u, discrete=True)
+    # One period from the point itself, and from beside it, by differences of the law written out.
+    model = Law.of(twin.model, SIGNALS)
+    other = augmented(model)
+    flown = tl.Twin(other.model(), other.signals)
+
+    def after(x):
+        return flown.simulate_commands(x, u[np.newaxis]).true_states[1]
+
+    step = 1e-6
+    columns = [
+        (after(plant.state + step * e) - after(plant.state - step * e)) / (2 * step) for e in np.eye(4)
+    ]
+    np.testing.assert_allclose(plant.A, np.array(columns).T, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"gap": 0.0},
+        {"gap": -0.01},
+        {"damping": 0.0},
+        {"turns": 0.0},
+        {"settled": True},
+        {"squared": True},
+    ],
+)
+def test_a_record_with_what_is_no_gap_is_refused(wrong):
+    twin = linear_twin(hidden=GAP)
+    law = Law.of(twin.model, SIGNALS)
+    assert same(Law.of(law.model(), SIGNALS).actuation, law.actuation)
+    assert same(tl.Twin.from_record(through_json(twin.to_record())).model.hidden, twin.model.hidden)
+    record, alone = (through_json(each.to_record()) for each in (twin, law.actuation))
+    for one in (record["model"]["hidden"], alone["hidden"]):
+        for place in (0, 1):
+            one[place].update(wrong)
+    with pytest.raises(tl.InvalidInput):
+        tl.Twin.from_record(record)
+    with pytest.raises(tl.InvalidInput):
+        Actuation.from_record(alone)
+
+
+@pytest.mark.parametrize("form", ["explicit-euler", "semi-implicit-euler", "increment", "absolute"])
+def test_a_gap_needs_a_law_that_is_integrated_finely(form):
+    with pytest.raises(tl.InvalidInput, match="gap"):
+        linear_twin(form, hidden=GAP)
+
+
 def test_a_record_with_one_that_turns_into_nothing_is_refused():
     twin = linear_twin(hidden=SWINGING)
     law = Law.of(twin.model, SIGNALS)
@@ -113,7 +216,7 @@ def test_at_an_instant_what_is_stored_is_filled_by_the_state_and_empties():
 
 
 def turning_twin():
-    stored = [((), False, 0.0, 0.3, (3,), False, 0.0)]
+    stored = [((), False, 0.0, 0.3, (3,), False, 0.0, 0.0, 0.0)]
     lines = ["r8 = r6 * 2.0", "r11 = r7 * -30.0", "r8 = r8 + r11"]
     return twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None, 0.0)], hidden=stored)
 
@@ -153,13 +256,18 @@ def test_a_law_and_a_record_give_it_back_to_the_bit():
 
 
 @pytest.mark.parametrize("kind", ["python", "c", "fmu3", "casadi", "control"])
-@pytest.mark.parametrize("which", ["stored", "swinging", "turning"])
+@pytest.mark.parametrize("which", ["stored", "swinging", "behind a gap", "turning"])
 def test_an_export_has_it_as_states(which, kind, tmp_path):
     """What is written is compared with the twin's own free runs before it is handed out."""
     needed = {"casadi": "casadi", "control": "control", "fmu3": "fmpy"}
     if kind in needed:
         pytest.importorskip(needed[kind])
-    made = {"stored": stored_twin, "swinging": lambda: linear_twin(hidden=SWINGING), "turning": turning_twin}
+    made = {
+        "stored": stored_twin,
+        "swinging": lambda: linear_twin(hidden=SWINGING),
+        "behind a gap": lambda: linear_twin(hidden=GAP),
+        "turning": turning_twin,
+    }
     plain = made[which]()
     twin = tl.Twin(plain.model, plain.signals, flights=[flown(plain, seed=seed) for seed in range(2)])
     suffix = {"c": ".c", "fmu3": ".fmu"}.get(kind, ".py")

@@ -133,9 +133,9 @@ class Filling:
 
 
 HIDDEN = [
-    [([0, 1], True, 0.3, 0.7, [], False, 0.0)],
-    [([1], False, None, 0.2, [], False, 0.0)],
-    [([0], True, None, 5.0, [], False, 0.0), ([0, 1], False, 0.0, 0.1, [], False, 0.0)],
+    [([0, 1], True, 0.3, 0.7, [], False, 0.0, 0.0, 0.0)],
+    [([1], False, None, 0.2, [], False, 0.0, 0.0, 0.0)],
+    [([0], True, None, 5.0, [], False, 0.0, 0.0, 0.0), ([0, 1], False, 0.0, 0.1, [], False, 0.0, 0.0, 0.0)],
 ]
 
 
@@ -192,14 +192,14 @@ def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_setting,
 @pytest.mark.parametrize(
     "hidden",
     [
-        ([], True, None, 1.0, [], False, 0.0),
-        ([2], True, None, 1.0, [], False, 0.0),
-        ([0], True, np.nan, 1.0, [], False, 0.0),
-        ([0], True, None, 0.0, [], False, 0.0),
-        ([0], True, 0.0, 1.0, [0], False, 0.0),
-        ([0], True, 0.0, 1.0, [], True, 0.0),
-        ([], True, None, 1.0, [0], False, 0.0),
-        ([], True, 0.0, 1.0, [9], False, 0.0),
+        ([], True, None, 1.0, [], False, 0.0, 0.0, 0.0),
+        ([2], True, None, 1.0, [], False, 0.0, 0.0, 0.0),
+        ([0], True, np.nan, 1.0, [], False, 0.0, 0.0, 0.0),
+        ([0], True, None, 0.0, [], False, 0.0, 0.0, 0.0),
+        ([0], True, 0.0, 1.0, [0], False, 0.0, 0.0, 0.0),
+        ([0], True, 0.0, 1.0, [], True, 0.0, 0.0, 0.0),
+        ([], True, None, 1.0, [0], False, 0.0, 0.0, 0.0),
+        ([], True, 0.0, 1.0, [9], False, 0.0, 0.0, 0.0),
     ],
 )
 def test_hidden_states_that_there_are_none_of_are_refused(rig, hidden):
@@ -207,7 +207,7 @@ def test_hidden_states_that_there_are_none_of_are_refused(rig, hidden):
     with pytest.raises(ValueError, match="expected"):
         _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2, [hidden])
     with pytest.raises(ValueError, match="actuators: expected one for each of 2 commands, found 0"):
-        _core.Model(program, "absolute", rig, None, [([0], True, None, 1.0, [], False, 0.0)])
+        _core.Model(program, "absolute", rig, None, [([0], True, None, 1.0, [], False, 0.0, 0.0, 0.0)])
     with pytest.raises(ValueError, match="expected a program of 4 inputs"):
         _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2)
 
@@ -526,14 +526,14 @@ def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
     def model(a, b, c, time):
         lines = ["r3 = r0 * " + repr(a), "r4 = r1 * " + repr(b), "r3 = r3 + r4", "r4 = r2 * " + repr(c)]
         text = program_text(3, 1, 5, [[*lines, "r3 = r3 + r4"]])
-        hidden = [([0], True, 0.0, time, [], False, 0.0)]
+        hidden = [([0], True, 0.0, time, [], False, 0.0, 0.0, 0.0)]
         return _core.Model(_core.Program.parse(text), "acceleration", signals, [(0.0, 0, None, 0.0)], hidden)
 
     stream, records, steps = np.random.default_rng(5), [], 160
     for _ in range(2):
         commands = np.repeat(stream.uniform(-2.0, 2.0, (steps // 10, 1)), 10, axis=0)
         inputs = _core.command_effects(
-            [(0.0, 0, None, 0.0)], [([0], True, 0.0, truth[3], [], False, 0.0)], [1.0], DT, commands
+            [(0.0, 0, None, 0.0)], [([0], True, 0.0, truth[3], [], False, 0.0, 0.0, 0.0)], [1.0], DT, commands
         )
         states = [np.array([0.5])]
         for k in range(steps):

@@ -3,7 +3,7 @@
 //! and after these some that states fill.
 
 use crate::error::{Result, invalid};
-use crate::hidden::{Filling, Hidden};
+use crate::hidden::{Filling, Hidden, Play};
 use crate::lanes::{Vector, vectors, zeros};
 
 /// The way from one command to its effect.
@@ -88,12 +88,17 @@ impl Actuation {
     }
 
     /// Lag of each actuator, then time of each hidden state, then the time in which each that has a partner turns, then
-    /// the ramp of each actuator that has one, s.
+    /// half the gap and the damping of each that has a gap before it, then the ramp of each actuator that has one, s.
     pub fn times(&self) -> Vec<f64> {
         let lags = self.actuators.iter().map(|actuator| actuator.lag);
         let times = self.hidden.iter().map(|hidden| hidden.time);
         let turns = self.hidden.iter().filter_map(Hidden::turns);
-        lags.chain(times).chain(turns).chain(self.ramping().map(|i| self.actuators[i].ramp)).collect()
+        let gaps = self.hidden.iter().filter_map(Hidden::play).flat_map(|play| [play.half, play.damping]);
+        lags.chain(times)
+            .chain(turns)
+            .chain(gaps)
+            .chain(self.ramping().map(|i| self.actuators[i].ramp))
+            .collect()
     }
 
     /// Commands whose effects move at a limited rate.
@@ -118,7 +123,12 @@ impl Actuation {
         let (lags, rest) = times.split_at(self.actuators.len());
         let (rest, turns) = rest.split_at(self.hidden.len());
         let turning = other.hidden.iter_mut().filter_map(Hidden::turns_mut);
+        let number = self.hidden.iter().filter_map(Hidden::turns).count();
         turning.zip(turns).for_each(|(turns, &time)| *turns = time);
+        let playing = other.hidden.iter_mut().filter_map(Hidden::play_mut);
+        playing
+            .zip(turns[number..].chunks_exact(2))
+            .for_each(|(play, gap)| *play = Play { half: gap[0], damping: gap[1] });
         other.actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
         other.hidden.iter_mut().zip(rest).for_each(|(hidden, &time)| hidden.time = time);
         if self.is_direct() { Ok(other) } else { other.validated(self.actuators.len(), usize::MAX) }

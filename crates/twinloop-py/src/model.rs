@@ -5,8 +5,8 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, Report, RigidBody, Signals, Source,
-    checked_effects, state_of,
+    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, Play, Report, RigidBody, Signals,
+    Source, checked_effects, state_of,
 };
 
 use crate::arrays::{Cube, Matrix, Vector, rows, to_matrix, to_vector, vector};
@@ -142,7 +142,7 @@ impl PyModel {
         self.0.frame().actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest, a.ramp)).collect()
     }
 
-    /// (commands, squared, rest, time, states, settled, turns) of each hidden state.
+    /// (commands, squared, rest, time, states, settled, turns, half gap, damping) of each hidden state.
     #[getter]
     fn hidden(&self) -> Vec<HiddenParts> {
         self.0.frame().actuation().hidden.iter().map(parts).collect()
@@ -202,8 +202,8 @@ type ActuatorParts = (f64, usize, Option<f64>, f64);
 type HeldParts = (usize, usize, usize, usize);
 /// State, the other one, and what is kept of the last value and added of its change.
 type ComputedParts = (usize, usize, f64, f64);
-/// Commands, whether squared, rest, time, states, whether settled, in which it turns.
-type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool, f64);
+/// Commands, whether squared, rest, time, states, whether settled, in which it turns, half of its gap and what damps there.
+type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool, f64, f64, f64);
 
 fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Result<Actuation> {
     let actuator = |(lag, delay, rest, ramp)| Actuator { lag, delay, rest, ramp };
@@ -214,11 +214,16 @@ fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Result<
 }
 
 /// A hidden state of its parts; commands or states fill it, and not both.
-fn filled((commands, squared, rest, time, states, settled, turns): HiddenParts) -> Result<Hidden> {
+fn filled(
+    (commands, squared, rest, time, states, settled, turns, half, damping): HiddenParts,
+) -> Result<Hidden> {
+    let play = (half != 0.0 || damping != 0.0).then_some(Play { half, damping });
     let turns = (turns != 0.0).then_some(turns);
     let source = match (commands.is_empty(), states.is_empty(), rest) {
-        (false, true, _) if !settled && turns.is_none() => Source::Commands { commands, rest },
-        (true, false, Some(rest)) => Source::States { states, rest, settled, turns },
+        (false, true, _) if !settled && turns.is_none() && play.is_none() => {
+            Source::Commands { commands, rest }
+        }
+        (true, false, Some(rest)) => Source::States { states, rest, settled, turns, play },
         _ => {
             return Err(misuse(format!(
                 "hidden state: expected commands, or states with a rest, that fill it, and only with states that it is \
@@ -233,15 +238,18 @@ fn filled((commands, squared, rest, time, states, settled, turns): HiddenParts) 
 fn parts(hidden: &Hidden) -> HiddenParts {
     let Hidden { source, squared, time } = hidden;
     match source.clone() {
-        Source::Commands { commands, rest } => (commands, *squared, rest, *time, vec![], false, 0.0),
-        Source::States { states, rest, settled, turns } => {
-            (vec![], *squared, Some(rest), *time, states, settled, turns.unwrap_or(0.0))
+        Source::Commands { commands, rest } => {
+            (commands, *squared, rest, *time, vec![], false, 0.0, 0.0, 0.0)
+        }
+        Source::States { states, rest, settled, turns, play } => {
+            let (half, damping) = play.map_or((0.0, 0.0), |play| (play.half, play.damping));
+            (vec![], *squared, Some(rest), *time, states, settled, turns.unwrap_or(0.0), half, damping)
         }
     }
 }
 
 /// Effects of commands (n, n_u) in their units behind actuators (lag, delay, rest, ramp), then the hidden states that they
-/// fill (commands, squared, rest, time, no states, not settled, no turns), at the start, the middle and the end of each period.
+/// fill (commands, squared, rest, time, no states, not settled, no turns, no gap), at the start, the middle and the end of each period.
 #[pyfunction]
 pub fn command_effects<'py>(
     py: Python<'py>,

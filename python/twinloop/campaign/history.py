@@ -210,7 +210,8 @@ class Lesson(Recorded, kind="lesson"):
             explain the flights: a lag in it may stand for a state that is not logged.
         delays: of each command's actuator, periods; 0 as with `lags`.
         hidden: unmeasured states: which commands or states drive each, whether squared, the mean at rest in units of
-            their scale (None: that of the first period), the time constant in s, how it begins, and whether it turns.
+            their scale (None: that of the first period), the time constant in s, how it begins, and
+            whether it turns, or is behind a gap.
         offsets: delay of each state's readings against those of the driven states that are read in time, s.
         closed_loop: of the best model, one for each selected test, in units of the states' scales; infinite where it
             diverges.
@@ -250,7 +251,7 @@ class Lesson(Recorded, kind="lesson"):
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version: commands alone filled hidden states, that had no names, or none turned."""
+        """A record of an earlier version, whose hidden states had no names, were filled by commands alone, or knew no gap."""
         found = super().renewed(record)
         if "hidden" in found:
             found["hidden"] = renewed_hidden(found["hidden"])

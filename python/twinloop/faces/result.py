@@ -261,6 +261,8 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
                 "states": [campaign.signals.state_names[i] for i in hidden.states],
                 "settled": hidden.settled,
                 "turns": hidden.turns,
+                "gap": hidden.gap,
+                "damping": hidden.damping,
             }
             for hidden in lesson.hidden
         ],

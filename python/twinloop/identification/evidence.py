@@ -21,6 +21,8 @@ STANDING_IN = 30.0
 Those that stand in for what is not in the law at all gain some tens of units, the same after each flight; those of a
 machine hundreds, and more with each flight. Until then they may lead to others, which are not found without them.
 """
+PLAYING = 12.0
+"""For each of the two numbers that a gap has beyond a spring without one."""
 STORING = 10.0
 """What each hidden state must gain besides where states fill one, with the choice among all that may."""
 CORRELATED = 16.0
@@ -102,5 +104,6 @@ def price(
         + HIDING * bool(actuation.hidden)
         + STANDING_IN * (tuned and bool(actuation.hidden) and not actuation.stored)
         + bool(actuation.stored) * STORING * len(actuation.hidden)
+        + PLAYING * sum(one.gap > 0.0 for one in actuation.stored)
         + len(actuation.stored) * 2.0 * float(log(2.0 * states * (1 + len(alike))))
     )

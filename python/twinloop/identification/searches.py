@@ -15,6 +15,7 @@ from twinloop.identification.proposals.at_once import at_once
 from twinloop.identification.proposals.bare import bare
 from twinloop.identification.proposals.contacts import contacts
 from twinloop.identification.proposals.friction import friction
+from twinloop.identification.proposals.gaps import gaps
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
 from twinloop.identification.proposals.parts import parts
@@ -28,7 +29,7 @@ from twinloop.records import Recorded
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
 PROPOSALS: tuple[Proposal, ...] = (
-    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, second_look, parts, bare, at_once,
+    lags, hidden, terms, undisturbed, apart, storage, gaps, friction, contacts, second_look, parts, bare, at_once,
 )  # fmt: skip
 """In the order in which they are made."""
 

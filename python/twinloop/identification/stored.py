@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.identification.gaps import Masses, behind_gaps
 from twinloop.law.actuation import HiddenState
 from twinloop.signals import Signals
 
@@ -19,7 +20,7 @@ def stored(
     """A hidden state that states fill, within each period: one Runge-Kutta step of order four, as the law takes it.
 
     Args:
-        hidden: that states fill; of two that turn into each other the first one.
+        hidden: that states fill; of two that turn into each other, or are beside a gap, the first one.
         stages: inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one.
         runs: rows of each run.
         signals: of the system.
@@ -31,7 +32,7 @@ def stored(
     scales = np.array([signals.states[place].scale for place in hidden.states])
     dt, rest = signals.dt, hidden.rest or 0.0
     # Two that turn into each other are one complex number z: z' = (1 + i) filling - (1 / time - i / turns) z.
-    turning = hidden.turns > 0.0
+    turning = hidden.turns > 0.0 and not hidden.gap
     fades = complex(1.0 / hidden.time, -1.0 / hidden.turns) if turning else 1.0 / hidden.time
     time = 1.0 / fades if turning else hidden.time
 
@@ -41,6 +42,10 @@ def stored(
         return over * (1.0 + 1.0j) if turning else over
 
     first, half, last = (filling(inputs) for inputs in stages)
+    if hidden.gap:
+        one = Masses(*(np.array([x]) for x in (hidden.turns, hidden.gap, hidden.damping, hidden.time)))
+        start, middle, end = behind_gaps(one, (first, half, last), runs, dt)
+        return start[:, :, 0], middle[:, :, 0], end[:, :, 0]
     z = dt * fades if turning else dt / time
     square = z * z
     kept = 1.0 - z + square / 2.0 - square * z / 6.0 + square * square / 24.0

@@ -51,7 +51,7 @@ def in_periods(count: int) -> str:
     return f"{count} period{'s' if count != 1 else ''}"
 
 
-LATER: Mapping[str, object] = {"states": [], "settled": False, "turns": 0.0}
+LATER: Mapping[str, object] = {"states": [], "settled": False, "turns": 0.0, "gap": 0.0, "damping": 0.0}
 """What hidden states of earlier versions did not have."""
 
 
@@ -61,7 +61,9 @@ class HiddenState(NamedTuple):
     The level is the mean over its sources of what each gives, in units of its scale. At the start of a run h is 0, or
     in steady state under the first level. Two neighbours that the same drives may turn into each other, as the place
     and the speed of a mass on a spring do: - h2 / turns is added to the first one's derivative, h1 / turns to the
-    second's.
+    second's. Or the two are a mass behind a gap, such as the load of a gear with backlash: the law sees what presses on
+    it and its rate, h1 = press(s, ds/dt) of the twist s, ds/dt = level - h2, and dh2/dt = h1 / turns² - h2 / time. At
+    the start it moves along, in the middle of the gap.
 
     Args:
         commands: places of those that drive it; none where states do.
@@ -71,6 +73,8 @@ class HiddenState(NamedTuple):
         states: places of the states that drive it; none where commands do.
         settled: whether a run begins with it in steady state; only where states drive it.
         turns: time in which it and its partner turn by one radian, s; 0 where it has none; only where states drive it.
+        gap: half of the gap between it and its partner, in units of the level times s; 0 where there is none.
+        damping: of what presses beyond the gap, over its stiffness, s; 0 where there is no gap.
     """
 
     commands: tuple[int, ...]
@@ -80,10 +84,12 @@ class HiddenState(NamedTuple):
     states: tuple[int, ...] = ()
     settled: bool = False
     turns: float = 0.0
+    gap: float = 0.0
+    damping: float = 0.0
 
 
 def renewed_hidden(items: object) -> object:
-    """Hidden states as earlier versions wrote them: without names, filled by commands alone, or none that turned."""
+    """Hidden states as earlier versions wrote them: without names, by commands alone, none that turned, or no gap."""
     found, later = with_names(items, HiddenState._fields, *LATER.values()), dict(LATER)
     if not isinstance(found, list):
         return found
@@ -111,7 +117,7 @@ class Actuation(Recorded, kind="actuation"):
     actuators: tuple[Actuator, ...]
     hidden: tuple[HiddenState, ...] = ()
 
-    VERSION = 4
+    VERSION = 5
 
     @staticmethod
     def direct(signals: Signals) -> Actuation:
@@ -124,8 +130,8 @@ class Actuation(Recorded, kind="actuation"):
         if not model.actuators:
             return Actuation.direct(signals)
         hidden = (
-            HiddenState(tuple(commands), squared, rest, time, tuple(states), settled, turns)
-            for commands, squared, rest, time, states, settled, turns in model.hidden
+            HiddenState(tuple(commands), squared, rest, time, tuple(states), settled, *numbers)
+            for commands, squared, rest, time, states, settled, *numbers in model.hidden
         )
         return Actuation(tuple(Actuator(*actuator) for actuator in model.actuators), tuple(hidden))
 
@@ -156,7 +162,7 @@ class Actuation(Recorded, kind="actuation"):
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version, in which commands alone filled hidden states, none turned, or none ramped."""
+        """A record of an earlier version: commands alone filled hidden states, none turned, had a gap, or ramped."""
         found = super().renewed(record)
         if "actuators" in found:
             bare = with_names(found["actuators"], Actuator._fields, 0.0)
@@ -248,7 +254,14 @@ def _check_hidden(state: HiddenState, where: str) -> None:
     number(f"{where}.time", state.time, above=0.0)
     if state.rest is not None:
         number(f"{where}.rest", state.rest)
-    at_least_zero(f"{where}.turns", state.turns)
+    for name in ("turns", "gap", "damping"):
+        at_least_zero(f"{where}.{name}", getattr(state, name))
+    plays = state.turns > 0.0 and state.damping > 0.0 and not state.settled and not state.squared
+    if not plays if state.gap else state.damping:
+        raise InvalidInput(
+            f"{where}: expected a gap and a damping between two that turn into each other, neither squared nor settled,"
+            " or neither of them, found others."
+        )
     driven = bool(state.commands) != bool(state.states) and (state.turns == 0.0 or bool(state.states))
     if not driven or (state.commands and state.settled) or (state.states and state.rest is None):
         raise InvalidInput(

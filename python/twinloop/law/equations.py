@@ -16,8 +16,9 @@ from twinloop.law.expansion import Expansion, Monomial, Polynomial, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.flown import Span
 from twinloop.law.forms import DERIVATIVES
-from twinloop.law.law import Law
+from twinloop.law.law import Law, twist_name
 from twinloop.law.levels import in_words as levels_in_words
+from twinloop.law.play import FIRM
 from twinloop.law.reports import in_words as reports_in_words
 from twinloop.law.spread import Spread, spreads, varying_in
 from twinloop.law.writing import EXACT, TEXT, Term, Writer
@@ -252,12 +253,38 @@ class Equations:
         deviation = self._deviation(times)
         note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
         emptied = [] if hidden.rest == 0.0 else [("-", rest)]
+        if hidden.gap:
+            return self._behind_a_gap(number, [*given, *emptied], deviation)
         terms = [*given, *emptied, ("-", f"{name}/{self.writer.number(hidden.time)}")]
         partner = partners(self.law.actuation.hidden)[number]
         if partner != number:
             other = self.law.hidden_symbols[partner]
             terms.append(("-" if partner > number else "+", f"{other}/{self.writer.number(hidden.turns)}"))
         return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
+
+    def _behind_a_gap(self, number: int, driven: list[tuple[str, str]], deviation: str) -> list[str]:
+        """The equations of a mass behind a gap: what presses on it, or its rate."""
+        hidden, write = self.law.actuation.hidden[number], self.writer.number
+        partner = partners(self.law.actuation.hidden)[number]
+        name, other = (self.law.hidden_symbols[place] for place in (number, partner))
+        if partner < number:
+            square = write(hidden.turns * hidden.turns)
+            terms = [("+", f"{other}/{square}"), ("-", f"{name}/{write(hidden.time)}")]
+            note = f"moves along at the start{deviation and f'; its time {write(hidden.time)}{deviation} s'}"
+            return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
+        twist, sides = twist_name(name), []
+        damped = f"{write(hidden.damping)}*d {twist} / dt"
+        for sign, nearer, least in (("-", "min", "max"), ("+", "max", "min")):
+            deep = f"{twist} {sign} {write(hidden.gap)}"
+            sides.append(("+", f"{least}(0, {nearer}({write(FIRM)}*({deep}), {deep} + {damped}))"))
+        note = (
+            f"from 0 at the start; {name} is what presses beyond a gap, half of which is {write(hidden.gap)}"
+        )
+        return [
+            *_equation(name, [_Piece(sides)]),
+            *_equation(f"d {twist} / dt", [_Piece([*driven, ("-", other)])]),
+            *_comment(note),
+        ]
 
     def _alike(self, member: Law) -> bool:
         """Whether a member has hidden states like those of the law."""

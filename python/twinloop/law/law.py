@@ -8,7 +8,7 @@ from functools import cached_property
 
 from twinloop import _core
 from twinloop._ground.values import Value
-from twinloop.law.actuation import Actuation
+from twinloop.law.actuation import Actuation, partners
 from twinloop.law.expressions import INPUT, UPRIGHT, Expressions, Node
 from twinloop.law.levels import Levels
 from twinloop.law.reports import Reports, reports_of, with_reports
@@ -94,6 +94,16 @@ class Law(Value):
         return tuple(hidden_names(self.signals, len(self.actuation.hidden)))
 
     @property
+    def held_symbols(self) -> tuple[str, ...]:
+        """Names of what the hidden states hold from period to period: of what presses beyond a gap, the twist."""
+        hidden = self.actuation.hidden
+        symbols = zip(self.hidden_symbols, hidden, partners(hidden), strict=True)
+        return tuple(
+            twist_name(symbol) if one.gap and partner > place else symbol
+            for place, (symbol, one, partner) in enumerate(symbols)
+        )
+
+    @property
     def symbols(self) -> tuple[str, ...]:
         """A name for each input of the equations."""
         return (*self.signals.state_names, *self.command_symbols, *self.hidden_symbols)
@@ -151,6 +161,11 @@ class Law(Value):
     def _states(self) -> dict[str, int]:
         """The node of each state."""
         return {name: self.expressions.input(place) for place, name in enumerate(self.signals.state_names)}
+
+
+def twist_name(symbol: str) -> str:
+    """Name of the twist behind a hidden state that is what presses beyond a gap."""
+    return f"{symbol}_twist"
 
 
 def hidden_names(signals: Signals, count: int) -> list[str]:

@@ -20,6 +20,7 @@ MODEL_KEYS = ("program", "form", "actuators", "hidden")
 ACTUATOR_KEYS = ("lag", "delay", "rest")
 HIDDEN_KEYS = ("commands", "squared", "rest", "time")
 MOTION_KEYS = ("states", "settled")
+TURNING_KEYS = ("turns", "gap", "damping")
 HELD_KEYS = ("state", "every", "first", "age")
 COMPUTED_KEYS = ("state", "of", "kept", "share")
 
@@ -124,16 +125,21 @@ def _hidden_record(
     states: Sequence[int],
     settled: bool,
     turns: float,
+    gap: float,
+    damping: float,
 ) -> dict[str, Any]:
     """A hidden state; one that commands fill, or that turns into no other, as every version has written it."""
     record = dict(zip(HIDDEN_KEYS, (list(commands), squared, rest, time), strict=True))
     if states:
         record |= dict(zip(MOTION_KEYS, (list(states), settled), strict=True))
-    return record | {"turns": turns} if turns else record
+    numbers = {"turns": turns, "gap": gap, "damping": damping}
+    return record | {name: value for name, value in numbers.items() if value}
 
 
-def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float, list[int], bool, float]:
-    found = keys(value, HIDDEN_KEYS, where, optional=(*MOTION_KEYS, "turns"))
+def _hidden(
+    value: object, where: str
+) -> tuple[list[int], bool, float | None, float, list[int], bool, float, float, float]:
+    found = keys(value, HIDDEN_KEYS, where, optional=(*MOTION_KEYS, *TURNING_KEYS))
 
     def places(key: str) -> list[int]:
         items = read_list(found.get(key, []), f"{where}.{key}")
@@ -141,8 +147,9 @@ def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, f
 
     squared, settled = (read_flag(found.get(key, False), f"{where}.{key}") for key in ("squared", "settled"))
     time = read_number(found["time"], f"{where}.time")
-    turns = read_number(found.get("turns", 0.0), f"{where}.turns")
-    return places("commands"), squared, _rest(found["rest"], where), time, places("states"), settled, turns
+    turns, gap, damping = (read_number(found.get(key, 0.0), f"{where}.{key}") for key in TURNING_KEYS)
+    rest = _rest(found["rest"], where)
+    return places("commands"), squared, rest, time, places("states"), settled, turns, gap, damping
 
 
 def _rest(value: object, where: str) -> float | None:

@@ -35,7 +35,7 @@ TIMES = st.sampled_from([0.05, 0.3, 5.0])
 
 
 def model_of(form, lag, delay, rest, time):
-    hidden = [([0], True, rest, time, [], False, 0.0)]
+    hidden = [([0], True, rest, time, [], False, 0.0, 0.0, 0.0)]
     return _core.Model(LAW, form, SIGNALS.engine, [(lag, delay, rest, 0.0)], hidden)
 
 

@@ -88,7 +88,7 @@ def test_kinematics_are_among_the_equations(usual, form):
 
 ACTUATED = {
     "actuators": [(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)],
-    "hidden": [((0, 1), True, None, 0.7, (), False, 0.0)],
+    "hidden": [((0, 1), True, None, 0.7, (), False, 0.0, 0.0, 0.0)],
     "inputs": 5,
 }
 FILLED = ["r5 = r4 * 3.0", "r6 = r2 * 11.0", "r5 = r5 + r6", "r6 = r3 * r0", "r5 = r5 - r6"]

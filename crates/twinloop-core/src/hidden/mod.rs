@@ -45,7 +45,34 @@ pub enum Source {
         settled: bool,
         /// In which it and its partner turn by one radian, s; none: it has no partner.
         turns: Option<f64>,
+        /// The gap between two that turn, such as backlash before a load; none: they turn everywhere.
+        play: Option<Play>,
     },
+}
+
+/// A gap, on both sides of which a mass is pressed: by a spring and a damper that never pull.
+///
+/// Then the first of two hidden states is their twist, s' = mean of what fills it − h₂, and the second one the rate of the
+/// mass: h₂' = press(s, s') / turns² − h₂ / time, in units of what fills them. A program sees the press in the twist's place.
+/// At the start of a run the mass moves along, in the middle of the gap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Play {
+    /// Half of the gap, in units of what fills the twist times s.
+    pub half: f64,
+    /// Damping over stiffness of what presses, s.
+    pub damping: f64,
+}
+
+/// By how much what presses stiffens where it just touches, so that nothing jumps.
+pub(crate) const FIRM: f64 = 100.0;
+
+impl Play {
+    /// What presses at a twist that changes at a rate.
+    pub(crate) fn press(self, twist: f64, rate: f64) -> f64 {
+        let side = if twist < 0.0 { -1.0 } else { 1.0 };
+        let beyond = side * twist - self.half;
+        side * (FIRM * beyond).min(beyond + side * self.damping * rate).max(0.0)
+    }
 }
 
 impl Hidden {
@@ -58,8 +85,14 @@ impl Hidden {
             Source::Commands { commands: filling, rest } => {
                 some_of(filling, commands) && rest.is_none_or(f64::is_finite)
             }
-            Source::States { states: filling, rest, turns, .. } => {
-                some_of(filling, states) && rest.is_finite() && turns.is_none_or(positive)
+            Source::States { states: filling, rest, turns, play, settled } => {
+                let played = |Play { half, damping }: Play| {
+                    positive(half) && positive(damping) && turns.is_some() && !settled && !self.squared
+                };
+                some_of(filling, states)
+                    && rest.is_finite()
+                    && turns.is_none_or(positive)
+                    && play.is_none_or(played)
             }
         };
         if fits && positive(self.time) {
@@ -81,6 +114,22 @@ impl Hidden {
         match self.source {
             Source::Commands { .. } => None,
             Source::States { turns, .. } => turns,
+        }
+    }
+
+    /// The gap between it and its partner; none where there is none.
+    pub(crate) fn play(&self) -> Option<Play> {
+        match self.source {
+            Source::Commands { .. } => None,
+            Source::States { play, .. } => play,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn play_mut(&mut self) -> Option<&mut Play> {
+        match &mut self.source {
+            Source::Commands { .. } => None,
+            Source::States { play, .. } => play.as_mut(),
         }
     }
 
@@ -106,7 +155,13 @@ mod tests {
     }
 
     fn of_states(states: Vec<usize>, rest: f64, turns: Option<f64>) -> Hidden {
-        of(Source::States { states, rest, settled: true, turns })
+        of(Source::States { states, rest, settled: true, turns, play: None })
+    }
+
+    fn behind_a_gap(half: f64, damping: f64, turns: Option<f64>) -> Hidden {
+        let play = Some(Play { half, damping });
+        let source = Source::States { states: vec![1], rest: 0.0, settled: false, turns, play };
+        Hidden { source, squared: false, time: 0.3 }
     }
 
     #[test]
@@ -116,6 +171,7 @@ mod tests {
             of_commands(vec![0], Some(0.25)),
             of_states(vec![0, 1], 0.25, None),
             of_states(vec![1], 0.25, Some(0.04)),
+            behind_a_gap(0.01, 0.002, Some(0.04)),
         ] {
             assert_eq!(right.clone().validated(1, 2), Ok(right));
         }
@@ -132,6 +188,10 @@ mod tests {
             of_states(vec![1], f64::INFINITY, None),
             of_states(vec![1], 0.25, Some(0.0)),
             of_states(vec![1], 0.25, Some(f64::NAN)),
+            behind_a_gap(0.0, 0.002, Some(0.04)),
+            behind_a_gap(0.01, f64::NAN, Some(0.04)),
+            behind_a_gap(0.01, 0.002, None),
+            Hidden { squared: true, ..behind_a_gap(0.01, 0.002, Some(0.04)) },
             Hidden { time: 0.0, ..of_states(vec![1], 0.25, None) },
             Hidden { time: f64::INFINITY, ..of_commands(vec![0], None) },
         ] {

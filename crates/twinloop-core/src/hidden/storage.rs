@@ -1,6 +1,6 @@
 //! What states fill, in the course of a run: integrated with the states, point after point.
 
-use super::{Hidden, Source};
+use super::{Hidden, Play, Source};
 use crate::lanes::{Vector, numbers, vectors};
 
 /// The hidden states of a model that its own states fill, with what a program sees of commands and of them.
@@ -12,7 +12,7 @@ pub(crate) struct Storage<V> {
 
 impl<V: Vector> Storage<V> {
     /// At the start of a run, of those among some hidden states that states fill, if there are any; the times of all, then
-    /// those in which they turn, are given lane by lane, and steps of the integrator in s, `staged` if they are of Runge and
+    /// those in which they turn, then their gaps, are given lane by lane, and steps of the integrator in s, `staged` if they are of Runge and
     /// Kutta.
     #[inline(never)]
     pub fn new(
@@ -71,6 +71,8 @@ struct Partner {
     place: usize,
     /// How much of it leaves for the partner's every unit, 1 / s: below 0 for the second of a pair.
     rate: f64,
+    /// The gap between them.
+    play: Option<Play>,
 }
 
 /// What states have filled, in the course of a run.
@@ -133,14 +135,26 @@ impl Stored {
             self.settle(&inflow);
         }
         let points = self.points(&inflow);
-        self.slope = (0..points.len()).map(|i| self.slope_at(i, &points, &inflow)).collect();
+        let presses = self.presses(&points, &inflow);
+        self.slope = (0..points.len()).map(|i| self.slope_at(i, &presses, &points, &inflow)).collect();
         if self.staged {
             self.sum_up();
         } else {
             self.now.clone_from(&points);
         }
         self.stage = Some(if self.staged { (self.stage.unwrap_or(0) + 1) % SIXTHS.len() } else { 0 });
-        points
+        presses
+    }
+
+    /// What is seen at points: the points, but for twists of a gap what presses there.
+    fn presses(&self, points: &[f64], inflow: &[f64]) -> Vec<f64> {
+        let of = |i: usize| match self.partners[i] {
+            Some(Partner { place, rate, play: Some(play) }) if rate > 0.0 => {
+                play.press(points[i], inflow[i] - points[place])
+            }
+            _ => points[i],
+        };
+        (0..points.len()).map(of).collect()
     }
 
     /// What flows into each number.
@@ -152,6 +166,13 @@ impl Stored {
 
     /// Fills those that a run begins with settled, so that they stay as they are under this inflow.
     fn settle(&mut self, inflow: &[f64]) {
+        for i in 0..self.now.len() {
+            if let Some(Partner { rate, play: Some(_), .. }) = self.partners[i]
+                && rate < 0.0
+            {
+                self.now[i] = inflow[i];
+            }
+        }
         for i in (0..self.now.len()).filter(|i| self.inflows[i / self.lanes].settled) {
             self.now[i] = match self.partners[i] {
                 Some(_) => self.solved(i, 0.0, 1.0, inflow),
@@ -182,9 +203,14 @@ impl Stored {
     }
 
     /// Slope of one number at a point.
-    fn slope_at(&self, i: usize, points: &[f64], inflow: &[f64]) -> f64 {
-        let slope = inflow[i] - points[i] / self.times[i];
-        self.partners[i].map_or(slope, |partner| slope - points[partner.place] * partner.rate)
+    fn slope_at(&self, i: usize, presses: &[f64], points: &[f64], inflow: &[f64]) -> f64 {
+        let fading = points[i] / self.times[i];
+        match self.partners[i] {
+            None => inflow[i] - fading,
+            Some(Partner { place, rate, play: None }) => inflow[i] - fading - points[place] * rate,
+            Some(Partner { place, rate, .. }) if rate > 0.0 => inflow[i] - points[place],
+            Some(Partner { place, rate, .. }) => presses[place] * (rate * rate) - fading,
+        }
     }
 
     /// Adds the slope of this stage to the sum of the step, and moves on after the last stage.
@@ -202,16 +228,17 @@ impl Stored {
     /// One of what solves `own` h + `share` (h / time + what it turns into) = `right`, for each of them.
     fn solved(&self, i: usize, own: f64, share: f64, right: &[f64]) -> f64 {
         let fades = own + share / self.times[i];
-        let Some(Partner { place, rate }) = self.partners[i] else { return right[i] / fades };
+        let Some(Partner { place, rate, .. }) = self.partners[i] else { return right[i] / fades };
         let (others, turned) = (own + share / self.times[place], share * rate);
         (right[i] * others - turned * right[place]) / (fades * others + turned * turned)
     }
 }
 
-/// The partner of each number; those that turn come in pairs. The times in which they do are given lane by lane.
+/// The partner of each number; those that turn come in pairs. The times in which they do, then half of each gap and its
+/// damping, are given lane by lane.
 fn partners(hidden: &[Hidden], turns: &[f64], lanes: usize) -> Vec<Option<Partner>> {
     let mut partners = Vec::with_capacity(hidden.len() * lanes);
-    let mut turning = 0;
+    let (mut turning, mut playing) = (0, hidden.iter().filter(|one| one.turns().is_some()).count());
     for (k, kind) in hidden.iter().enumerate() {
         if kind.turns().is_none() {
             partners.resize(partners.len() + lanes, None);
@@ -219,8 +246,13 @@ fn partners(hidden: &[Hidden], turns: &[f64], lanes: usize) -> Vec<Option<Partne
         }
         let (other, side) = if turning % 2 == 0 { (k + 1, 1.0) } else { (k - 1, -1.0) };
         let times = &turns[turning * lanes..][..lanes];
-        let on_lane =
-            |(lane, time): (usize, &f64)| Partner { place: other * lanes + lane, rate: side / time };
+        let gaps = kind.play().map(|_| &turns[playing * lanes..][..2 * lanes]);
+        playing += 2 * usize::from(gaps.is_some());
+        let on_lane = |(lane, time): (usize, &f64)| Partner {
+            place: other * lanes + lane,
+            rate: side / time,
+            play: gaps.map(|gaps| Play { half: gaps[lane], damping: gaps[lanes + lane] }),
+        };
         partners.extend(times.iter().enumerate().map(on_lane).map(Some));
         turning += 1;
     }
@@ -240,7 +272,11 @@ mod tests {
     const TIMES: [f64; 2] = [0.3, 0.05];
 
     fn filled_by_the_second(squared: bool, settled: bool, turns: Option<f64>) -> Hidden {
-        Hidden { source: Source::States { states: vec![1], rest: 0.25, settled, turns }, squared, time: 0.3 }
+        Hidden {
+            source: Source::States { states: vec![1], rest: 0.25, settled, turns, play: None },
+            squared,
+            time: 0.3,
+        }
     }
 
     /// What a state of 4 (1 + t), in units of 4, has filled by a time: h' = 1 + t − rest − h / T, or with (1 + t)².
@@ -333,6 +369,62 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_mass_behind_a_gap_moves_as_its_equations_say() {
+        let (time, turns, play) = (0.5, 0.02, Play { half: 0.003, damping: 0.004 });
+        let source = Source::States {
+            states: vec![1],
+            rest: 0.0,
+            settled: false,
+            turns: Some(turns),
+            play: Some(play),
+        };
+        let one = Hidden { source, squared: false, time };
+        let times = [time, time, turns, turns, play.half, play.damping, play.half, play.damping];
+        let times: Vec<f64> = times.iter().flat_map(|&time| [time; 2]).collect();
+        let step = 0.02 * DT;
+        let mut storage =
+            Storage::<Wide<f64, 2>>::new(&[one.clone(), one], &[1.0, 0.25], &times, step, true).unwrap();
+        let filled = |t: f64| (40.0 * t).cos() - 0.5;
+        let mut z = [0.0, filled(0.0)];
+        // Springs and dampers that never pull, on either side.
+        let press = |twist: f64, rate: f64| {
+            if twist > play.half {
+                (twist - play.half + play.damping * rate).max(0.0).min(100.0 * (twist - play.half))
+            } else if twist < -play.half {
+                (twist + play.half + play.damping * rate).min(0.0).max(100.0 * (twist + play.half))
+            } else {
+                0.0
+            }
+        };
+        let mut pressed = 0;
+        for k in 0..1500 {
+            let t = f64::from(k) * step;
+            let at = |share: f64| [Wide::splat(7.0), Wide::splat(4.0 * filled(t + share * step))];
+            let seen: Vec<_> =
+                [0.0, 0.5, 0.5, 1.0].iter().map(|&share| storage.see(&at(share), &[]).to_vec()).collect();
+            let expected = [press(z[0], filled(t) - z[1]), z[1]];
+            pressed += usize::from(expected[0] != 0.0);
+            for (part, expected) in expected.into_iter().enumerate() {
+                for lane in 0..2 {
+                    let found = seen[0][part].lane(lane);
+                    assert!((found - expected).abs() < 3e-3, "{k} {part}: {found} {expected}");
+                }
+            }
+            for part in 0..100 {
+                let (h, now) = (1e-2 * step, t + f64::from(part) * 1e-2 * step);
+                let slope = |z: [f64; 2], t: f64| {
+                    let rate = filled(t) - z[1];
+                    [rate, press(z[0], rate) / (turns * turns) - z[1] / time]
+                };
+                let first = slope(z, now);
+                let second = slope([z[0] + 0.5 * h * first[0], z[1] + 0.5 * h * first[1]], now + 0.5 * h);
+                z = [z[0] + h * second[0], z[1] + h * second[1]];
+            }
+        }
+        assert!((250..1450).contains(&pressed), "{pressed}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::form::Form;
 use crate::actuators::Actuation;
 use crate::difference::Periods;
-use crate::error::Result;
+use crate::error::{Result, invalid};
 use crate::levels::Levels;
 use crate::sensors::Sensors;
 use crate::signals::{RigidBody, Signals};
@@ -119,6 +119,11 @@ impl Frame {
     /// The same with something between commands and model, an actuator for each command.
     pub fn with_actuation(self, actuation: Actuation) -> Result<Self> {
         let actuation = actuation.validated(self.commands, self.slopes.len())?;
+        if self.form != Form::Acceleration && actuation.hidden.iter().any(|hidden| hidden.play().is_some()) {
+            return invalid(
+                "hidden states: expected a gap only in a law of derivatives that are integrated finely",
+            );
+        }
         let mut factors = self.factors;
         // Hidden states are made of commands in units of their scales.
         factors.resize(self.commands + actuation.hidden.len(), 1.0);

@@ -81,7 +81,7 @@ def tune(
 
 
 def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:
-    """Groups of lags, times of hidden states, those in which pairs turn, and ramps, each of which is one number."""
+    """Groups of lags, times of hidden states, those in which pairs turn, gaps, and ramps, each one number."""
     actuation = Actuation.of(model, signals)
     lags = [list(group) for group in hypothesis.alike if actuation.actuators[group[0]].lag > 0.0]
     # Hidden states that begin with one time keep one.
@@ -94,6 +94,10 @@ def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals
         for time in dict.fromkeys(each)
     ]
     first = signals.n_u + len(times) + len(turns)
+    # Then half of each gap, and what damps beyond it, of both that are beside it.
+    plays = sum(state.gap > 0.0 for state in actuation.hidden)
+    groups += [[first + 4 * j + k, first + 4 * j + k + 2] for j in range(plays // 2) for k in (0, 1)]
+    first += 2 * plays
     places = {
         i: first + j for j, i in enumerate(i for i, one in enumerate(actuation.actuators) if one.ramp > 0.0)
     }
@@ -106,6 +110,9 @@ def _forgetting(model: _core.Model, signals: Signals, longest: float) -> tuple[_
     actuation = Actuation.of(model, signals)
     times = [actuator.lag for actuator in actuation.actuators] + [state.time for state in actuation.hidden]
     times += [state.turns for state in actuation.hidden if state.turns > 0.0]
+    times += [
+        number for state in actuation.hidden if state.gap > 0.0 for number in (state.gap, state.damping)
+    ]
     endless = {place for place, time in enumerate(times) if place >= signals.n_u and time > longest}
     times += [actuator.ramp for actuator in actuation.actuators if actuator.ramp > 0.0]
     if endless:

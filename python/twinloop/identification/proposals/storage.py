@@ -88,7 +88,7 @@ def _told(context: Context, bare: Hypothesis, brief: bool = False) -> Iterator[H
         bare: without such states.
         brief: as for `filled_by_motion`.
     """
-    screens = [Screen.of(context, variant) for variant in (bare, *_at_once(context, bare))]
+    screens = [Screen.of(context, variant) for variant in (bare, *at_once(context, bare))]
     for screen in screens:
         for found in filled_by_motion(screen, brief):
             # What is stored in place of a lag describes more than the lag alone, or all that is fitted is in vain.
@@ -162,7 +162,7 @@ def filled_by_motion(screen: Screen, brief: bool = False) -> Iterator[Hypothesis
             yield grown
 
 
-def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+def at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The same with commands that act at once, if any do not: a lag may have stood in for what is stored."""
     actuation, direct = hypothesis.actuation, Actuation.direct(context.signals)
     if context.may_lag and actuation.actuators != direct.actuators:
@@ -260,9 +260,9 @@ class Screen:
         """The hypothesis behind each of several hidden states, or pairs of them, with the best sums of few terms."""
         every = list(several)
         parts = (every[first:][:AT_ONCE] for first in range(0, len(every), AT_ONCE))
-        return [found for part in parts for found in self._searched([self._behind(one) for one in part])]
+        return [found for part in parts for found in self._searched([self.behind(one) for one in part])]
 
-    def _behind(self, sources: Sources) -> tuple[Hypothesis, Problem]:
+    def behind(self, sources: Sources) -> tuple[Hypothesis, Problem]:
         """The hypothesis behind hidden states, and its problem."""
         bare = self.hypothesis
         tried = replace(bare, actuation=replace(bare.actuation, hidden=sources))

@@ -12,6 +12,7 @@ from twinloop.law.actuation import Actuation, HiddenState, partners
 from twinloop.law.expressions import INPUT, Expressions
 from twinloop.law.law import Law
 from twinloop.law.linear.storage import settled
+from twinloop.law.play import FIRM
 from twinloop.signals import Signals, State
 
 
@@ -23,12 +24,15 @@ def augmented(law: Law) -> Law:
     """
     stored, signals = law.actuation.stored, law.signals
     n_x, count = signals.n_x, len(stored)
-    names = law.hidden_symbols[len(law.hidden_symbols) - count :]
+    names = law.held_symbols[len(law.held_symbols) - count :]
+    beside = partners(stored)
     added = [
-        State(name, "s", min(one.time, one.turns or one.time))
-        for name, one in zip(names, stored, strict=True)
+        _held(name, one, beside[place] < place)
+        for place, (name, one) in enumerate(zip(names, stored, strict=True))
     ]
     expressions, made = Expressions(), dict[int, int]()
+    presses = {place: place - law.inputs + count for place in range(law.inputs - count, law.inputs)}
+    presses = {place: of for place, of in presses.items() if stored[of].gap and partners(stored)[of] > of}
 
     def moved(place: int) -> int:
         """An input's place behind the new states, or among them."""
@@ -37,7 +41,9 @@ def augmented(law: Law) -> Law:
 
     for number in law.expressions.needed(law.outputs):
         node = law.expressions[number]
-        if node.operation == INPUT:
+        if node.operation == INPUT and int(node.value or 0) in presses:
+            made[number] = _press(expressions, signals, stored, presses[int(node.value or 0)])
+        elif node.operation == INPUT:
             made[number] = expressions.input(moved(int(node.value or 0)))
         else:
             operands = tuple(made[operand] for operand in node.operands)
@@ -59,12 +65,21 @@ def begun(law: Law, state: Floats) -> Floats:
     """A state (n_x,) with what its law's stored hidden states are there at the start of a run."""
     stored = law.actuation.stored
     still = settled(law, state)[len(law.actuation.hidden) - len(stored) :]
-    return np.concatenate([state, np.where([one.settled for one in stored], still, 0.0)])
+    # What is behind a gap moves along.
+    along = [one.settled or (bool(one.gap) and partners(stored)[i] < i) for i, one in enumerate(stored)]
+    return np.concatenate([state, np.where(along, still, 0.0)])
 
 
-def _slope(expressions: Expressions, signals: Signals, stored: Sequence[HiddenState], place: int) -> int:
-    """The node of a stored hidden state's derivative."""
-    one, make, constant = stored[place], expressions.add, expressions.constant
+def _held(name: str, one: HiddenState, second: bool) -> State:
+    """A stored hidden state as a state; a rate behind a gap is as large as what drives it, in units of its scale."""
+    if one.gap:
+        return State(name, "" if second else "s", 1.0 if second else one.gap + one.turns)
+    return State(name, "s", min(one.time, one.turns or one.time))
+
+
+def _level(expressions: Expressions, signals: Signals, one: HiddenState) -> int:
+    """The node of what fills a stored hidden state, beyond its rest."""
+    make, constant = expressions.add, expressions.constant
     total: int | None = None
     for source in one.states:
         given = make("*", expressions.input(source), constant(1.0 / signals.states[source].scale))
@@ -72,14 +87,38 @@ def _slope(expressions: Expressions, signals: Signals, stored: Sequence[HiddenSt
         total = given if total is None else make("+", total, given)
     assert total is not None
     level = make("*", total, constant(1.0 / len(one.states))) if len(one.states) > 1 else total
-    level = make("-", level, constant(one.rest)) if one.rest else level
+    return make("-", level, constant(one.rest)) if one.rest else level
+
+
+def _slope(expressions: Expressions, signals: Signals, stored: Sequence[HiddenState], place: int) -> int:
+    """The node of a stored hidden state's derivative."""
+    one, make, constant = stored[place], expressions.add, expressions.constant
+    partner = partners(stored)[place]
 
     def itself(of: int) -> int:
         return expressions.input(signals.n_x + of)
 
-    slope = make("-", level, make("/", itself(place), constant(one.time)))
-    partner = partners(stored)[place]
+    faded = make("/", itself(place), constant(one.time))
+    if one.gap and partner > place:
+        return make("-", _level(expressions, signals, one), itself(partner))
+    if one.gap:
+        pressed = _press(expressions, signals, stored, partner)
+        return make("-", make("/", pressed, constant(one.turns * one.turns)), faded)
+    slope = make("-", _level(expressions, signals, one), faded)
     if partner == place:
         return slope
     turned = make("/", itself(partner), constant(one.turns))
     return make("-" if partner > place else "+", slope, turned)
+
+
+def _press(expressions: Expressions, signals: Signals, stored: Sequence[HiddenState], place: int) -> int:
+    """The node of what presses beyond the gap of a twist, on one side or on the other."""
+    one, make, constant = stored[place], expressions.add, expressions.constant
+    twist, none = expressions.input(signals.n_x + place), constant(0.0)
+    damped = make("*", _slope(expressions, signals, stored, place), constant(one.damping))
+    sides = []
+    for beyond, nearer, least in (("-", "min", "max"), ("+", "max", "min")):
+        deep = make(beyond, twist, constant(one.gap))
+        pressed = make(nearer, make("*", deep, constant(FIRM)), make("+", deep, damped))
+        sides.append(make(least, pressed, none))
+    return make("+", *sides)

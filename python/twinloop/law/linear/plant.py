@@ -17,7 +17,7 @@ from twinloop.law.linear.jacobian import jacobian
 from twinloop.law.linear.reports import as_given
 from twinloop.law.linear.sensors import as_read
 from twinloop.law.linear.state_space import Linear
-from twinloop.law.linear.storage import fading, filling, settled
+from twinloop.law.linear.storage import fading, filling, moved, seen, settled, settled_as_seen
 
 HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
@@ -44,7 +44,7 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
     """
     plain = _period(law, state, command) if discrete else _instant(law, state, command)
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
-    point = np.concatenate([state, factors * command, settled(law, state)])
+    point = np.concatenate([state, factors * command, settled_as_seen(law, state)])
     found = as_given(law.reports, as_read(law, plain, _wrapped(law, point)), law.signals.dt)
     if not (np.isfinite(found.A).all() and np.isfinite(found.B).all() and np.isfinite(found.drift).all()):
         raise NotAvailable(
@@ -65,7 +65,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     lagging = [i for i, actuator in enumerate(law.actuation.actuators) if actuator.lag > 0.0]
     size = n_x + len(lagging) + len(hidden)
     factors = 1.0 / np.array([each.size for each in signals.commands])
-    point = np.concatenate([state, factors * command, settled(law, state)])
+    point = np.concatenate([state, factors * command, settled_as_seen(law, state)])
     values, slopes = jacobian(law.expressions, law.derivatives(), _wrapped(law, point))
     by_effect = slopes[:, n_x : n_x + n_u] * factors
     A, B, drift = np.zeros((size, size)), np.zeros((size, n_u)), np.zeros(size)
@@ -80,9 +80,14 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         lag = law.actuation.actuators[i].lag
         A[:n_x, place] = by_effect[:, i]
         A[place, place], B[place, i] = -1.0 / lag, 1.0 / lag
-    stored = filling(law, Dual(state, np.eye(n_x)))
-    kept = size - len(stored.values)
-    A[kept:, :n_x], A[kept:, kept:] = stored.slopes, -fading(law)
+    stored = len(law.actuation.stored)
+    kept, every = size - stored, np.eye(n_x + stored)
+    of_stored = slopes[:, slopes.shape[1] - stored :]
+    here = Dual(state, every[:n_x]), Dual(settled(law, state)[len(hidden) - stored :], every[n_x:])
+    A[:n_x, kept:] = 0.0
+    for slope, by in ((of_stored @ seen(law, *here).slopes, A[:n_x]), (moved(law, *here).slopes, A[kept:])):
+        by[:, :n_x] += slope[:, :n_x]
+        by[:, kept:] += slope[:, n_x:]
     for place, h in enumerate(hidden, start=n_x + len(lagging)):
         if h.states:
             continue
@@ -95,7 +100,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     return Linear(
         A,
         B,
-        (*signals.state_names, *names, *law.hidden_symbols),
+        (*signals.state_names, *names, *law.held_symbols),
         signals.command_names,
         np.concatenate([state, command[lagging], settled(law, state)]),
         command,
@@ -148,7 +153,7 @@ class _Begun:
         signals, actuators = law.signals, law.actuation.actuators
         sent = list(zip(signals.command_names, actuators, strict=True))
         names = [*signals.state_names, *(f"{name}_effect" for name, a in sent if a.lag > 0.0)]
-        names += law.hidden_symbols
+        names += law.held_symbols
         names += [f"{name}_{back}_before" for name, a in sent for back in range(a.delay, 0, -1)]
         identity, rows = np.eye(len(names) + signals.n_u), iter(range(len(names)))
 
@@ -245,19 +250,19 @@ def _stepped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> tuple[D
         inverse = np.asarray(np.linalg.inv(np.eye(len(fades)) + half * fades), dtype=np.float64)
         return after, (stored + added).mapped(inverse)
     size, n_x = len(x.values) + len(stored.values), len(x.values)
-    roots, body, fades = law.derivatives(), law.signals.kinematics, fading(law)
+    roots, body = law.derivatives(), law.signals.kinematics
 
     def slope(point: Dual, given: Dual) -> Dual:
-        states, held = (seen(point) if body else point.rows(range(n_x))), point.rows(range(n_x, size))
-        moved = [_given(law, roots, states, Dual.stacked([given, held]))]
-        moved.append(filling(law, states) - held.mapped(fades))
+        states, held = (upright(point) if body else point.rows(range(n_x))), point.rows(range(n_x, size))
+        slopes = [_given(law, roots, states, Dual.stacked([given, seen(law, states, held)]))]
+        slopes.append(moved(law, states, held))
         if body is not None:
             still = Dual(np.zeros(3), np.zeros((3, states.slopes.shape[1])))
-            moved[0] = moved[0].put(turns, still)
-            moved.append(turning(point.rows(range(size, size + 4)), states.rows(rates)))
-        return Dual.stacked(moved)
+            slopes[0] = slopes[0].put(turns, still)
+            slopes.append(turning(point.rows(range(size, size + 4)), states.rows(rates)))
+        return Dual.stacked(slopes)
 
-    def seen(point: Dual) -> Dual:
+    def upright(point: Dual) -> Dual:
         """The states, with the angles of the quaternion behind them."""
         found = angles(point.rows(range(size, size + 4)), x.values[turns])
         return point.rows(range(n_x)).put(turns, found)
@@ -271,7 +276,7 @@ def _stepped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> tuple[D
     for part in range(steps):
         given = [_between(inputs, (part + share) / steps) for share in (0.0, 0.5, 1.0)]
         begun = _integrated(slope, begun, law.signals.dt / steps, given)
-    ended = seen(begun) if body is not None else begun.rows(range(n_x))
+    ended = upright(begun) if body is not None else begun.rows(range(n_x))
     return ended, begun.rows(range(n_x, size))
 
 

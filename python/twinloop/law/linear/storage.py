@@ -1,4 +1,4 @@
-"""Hidden states that motion fills, around a point: what fills them, and where they settle."""
+"""Hidden states that motion fills, around a point: what fills them, what a law sees of them, and where they settle."""
 
 from __future__ import annotations
 
@@ -8,28 +8,36 @@ from twinloop._ground.arrays import Floats
 from twinloop.law.actuation import partners
 from twinloop.law.law import Law
 from twinloop.law.linear.dual import Dual
+from twinloop.law.play import FIRM, press
 
 
 def fading(law: Law) -> Floats:
-    """How fast the hidden states that states fill fade, and turn into each other (stored, stored), 1/s."""
+    """How fast the hidden states that states fill fade, and turn into each other (stored, stored), 1/s.
+
+    Of a twist before a gap it is how fast the rate behind it lessens the twist.
+    """
     stored = law.actuation.stored
     rates = np.diag([1.0 / one.time for one in stored])
     for place, partner in enumerate(partners(stored)):
-        if partner != place:
+        if partner > place and stored[place].gap:
+            rates[place, [place, partner]] = 0.0, 1.0
+        elif partner != place and not stored[place].gap:
             rates[place, partner] = (1.0 if partner > place else -1.0) / stored[place].turns
     return rates
 
 
 def filling(law: Law, states: Dual) -> Dual:
-    """What fills each of these hidden states beyond its rest, with its slopes.
+    """What fills each of these hidden states beyond its rest, with its slopes; nothing fills a rate behind a gap.
 
     Args:
         law: of a twin.
         states: of the signals, the first rows.
     """
     stored = law.actuation.stored
-    values, slopes = np.empty(len(stored)), np.empty((len(stored), states.slopes.shape[1]))
-    for row, one in enumerate(stored):
+    values, slopes = np.zeros(len(stored)), np.zeros((len(stored), states.slopes.shape[1]))
+    for row, (one, partner) in enumerate(zip(stored, partners(stored), strict=True)):
+        if one.gap and partner < row:
+            continue
         scales = np.array([law.signals.states[place].scale for place in one.states])
         given = states.rows(one.states) * (1.0 / scales)
         given = given * given if one.squared else given
@@ -38,13 +46,80 @@ def filling(law: Law, states: Dual) -> Dual:
     return Dual(values, slopes)
 
 
+def seen(law: Law, states: Dual, held: Dual) -> Dual:
+    """What the law sees of these hidden states: themselves, but of a twist before a gap what presses beyond it.
+
+    Args:
+        law: of a twin.
+        states: of the signals, the first rows.
+        held: the hidden states that states fill.
+    """
+    stored, found = law.actuation.stored, held
+    turning = filling(law, states) - held.mapped(fading(law))
+    for place, partner in enumerate(partners(stored)):
+        if partner > place and stored[place].gap:
+            found = found.put(
+                [place], _pressed(held.rows([place]), turning.rows([place]), *stored[place][-2:])
+            )
+    return found
+
+
+def moved(law: Law, states: Dual, held: Dual) -> Dual:
+    """Derivatives of these hidden states, by what fills them and by themselves.
+
+    Args:
+        law: of a twin.
+        states: of the signals, the first rows.
+        held: the hidden states that states fill.
+    """
+    stored, found = law.actuation.stored, filling(law, states) - held.mapped(fading(law))
+    presses = seen(law, states, held)
+    for place, partner in enumerate(partners(stored)):
+        if partner < place and stored[place].gap:
+            pressed = presses.rows([partner]) * (1.0 / (stored[place].turns * stored[place].turns))
+            found = found.put([place], found.rows([place]) + pressed)
+    return found
+
+
 def settled(law: Law, state: Floats) -> Floats:
     """All hidden states at a point: those that commands fill at 0, the others where they settle there.
+
+    A mass behind a gap moves along; its twist is such that what presses keeps it so, in the middle if nothing has to.
 
     Args:
         law: of a twin.
         state: (n_x,), SI units, radians.
     """
+    stored = law.actuation.stored
     filled = filling(law, Dual(state, np.zeros((len(state), 0)))).values
-    stored = np.linalg.solve(fading(law), filled)
-    return np.concatenate([np.zeros(len(law.actuation.hidden) - len(stored)), stored])
+    fades, bound = fading(law), filled
+    beside = [(i, j) for i, j in enumerate(partners(stored)) if j > i and stored[i].gap]
+    for twist, rate in beside:
+        # Their own equation is no linear one.
+        fades, bound = fades.copy(), bound.copy()
+        fades[[twist, rate]] = 0.0
+        fades[twist, twist] = fades[rate, rate] = 1.0
+        bound[rate] = filled[twist]
+        pressed = filled[twist] * stored[rate].turns ** 2 / stored[rate].time
+        bound[twist] = pressed + np.sign(pressed) * stored[twist].gap
+    found = np.linalg.solve(fades, bound)
+    return np.concatenate([np.zeros(len(law.actuation.hidden) - len(found)), found])
+
+
+def settled_as_seen(law: Law, state: Floats) -> Floats:
+    """The same as the law sees them."""
+    every, stored = settled(law, state), len(law.actuation.stored)
+    kept = len(every) - stored
+    none = np.zeros((len(state), 0))
+    held = Dual(every[kept:], np.zeros((stored, 0)))
+    return np.concatenate([every[:kept], seen(law, Dual(state, none), held).values])
+
+
+def _pressed(twist: Dual, rate: Dual, gap: float, damping: float) -> Dual:
+    """What presses at a twist that changes at a rate."""
+    side = np.where(twist.values < 0.0, -1.0, 1.0)
+    beyond = side * twist.values - gap
+    touching = FIRM * beyond < beyond + damping * side * rate.values
+    pressed = press(twist.values, rate.values, gap, damping)
+    slopes = np.where(touching[:, np.newaxis], FIRM * twist.slopes, twist.slopes + damping * rate.slopes)
+    return Dual(pressed, np.where(pressed[:, np.newaxis] == 0.0, 0.0, slopes))
