@@ -178,7 +178,7 @@ def test_gains_that_are_fixed_at_nothing_are_counted_rather_than_listed():
     assert row.split() == ["rate.kd", "0.7", "0.7", "N", "m/rad", "fixed"]
 
 
-def testhidden_states_are_said_one_by_one_and_a_mass_on_a_spring_once():
+def test_hidden_states_are_said_one_by_one_and_a_mass_on_a_spring_once():
     one = {"commands": [], "states": ["rate"], "squared": False, "time": 6.5, "turns": 0.1}
     other = {"commands": ["torque"], "states": [], "squared": True, "time": 1e6, "turns": 0.0}
     first, second, third = hidden_states([other, one, one, {**one, "turns": 0.2}, {**one, "turns": 0.2}])
@@ -187,3 +187,10 @@ def testhidden_states_are_said_one_by_one_and_a_mass_on_a_spring_once():
     )
     assert "values of rate" in second and "swings once in 0.628 s and decays to 1/e in 6.5 s" in second
     assert "swings once in 1.26 s" in third
+
+
+def test_a_mass_behind_a_gap_is_said_once_with_its_play():
+    one = {"commands": [], "states": ["rate"], "squared": False, "time": 0.7, "turns": 0.025, "gap": 0.06}
+    (said,) = hidden_states([one, one])
+    assert "behind a gap: rate drives it, with a play of ±0.06 in what that is the rate of" in said
+    assert "swing once in 0.157 s; its own rate decays to 1/e in 0.7 s" in said

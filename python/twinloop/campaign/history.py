@@ -251,7 +251,7 @@ class Lesson(Recorded, kind="lesson"):
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version, whose hidden states had no names, were filled by commands alone, or knew no gap."""
+        """A record of an earlier version: hidden states had no names, commands alone filled them, or none had a gap."""
         found = super().renewed(record)
         if "hidden" in found:
             found["hidden"] = renewed_hidden(found["hidden"])

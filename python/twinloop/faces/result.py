@@ -261,7 +261,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
                 "states": [campaign.signals.state_names[i] for i in hidden.states],
                 "settled": hidden.settled,
                 "turns": hidden.turns,
-                "gap": hidden.gap,
+                "gap": hidden.gap * campaign.signals.states[hidden.states[0]].scale if hidden.gap else 0.0,
                 "damping": hidden.damping,
             }
             for hidden in lesson.hidden

@@ -29,7 +29,7 @@ from twinloop.records import Recorded
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
 PROPOSALS: tuple[Proposal, ...] = (
-    lags, hidden, terms, undisturbed, apart, storage, gaps, friction, contacts, second_look, parts, bare, at_once,
+    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, gaps, second_look, parts, bare, at_once,
 )  # fmt: skip
 """In the order in which they are made."""
 

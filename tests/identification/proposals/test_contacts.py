@@ -96,7 +96,7 @@ def test_a_stop_is_found_where_it_is():
     assert all(run.states[:, 0].max() > STOP + 0.01 for run in runs)
 
     twin = tl.identify(runs, RAIL, seed=0)
-    without = tl.identify(runs, RAIL, seed=0, options={"contacts": False})
+    without = tl.identify(runs, RAIL, seed=0, options={"contacts": False, "storage": False})
 
     assert min(abs(place - STOP) for place in places(twin)) < 0.01
     unseen = pushed(6.0, 3) + 1.5

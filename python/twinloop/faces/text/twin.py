@@ -110,16 +110,22 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
 
 
 def hidden_states(states: Sequence[Mapping[str, Any]]) -> list[str]:
-    """States that no sensor reads, in words; two that turn into each other are one mass on a spring."""
+    """States that no sensor reads, in words; two that turn into each other are one mass."""
     said, alone = [], True
     for state in states:
         what = "squares" if state["squared"] else "values"
         fading = f"decays to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "does not decay"
         sources = ", ".join((*state["commands"], *state.get("states", ())))
-        turns = state.get("turns", 0.0)
+        turns, gap = state.get("turns", 0.0), state.get("gap", 0.0)
         if not turns:
             said.append(
                 f"Hidden state: the {what} of {sources} drive a state that is not measured; it {fading}."
+            )
+        elif alone and gap:
+            said.append(
+                f"Hidden mass behind a gap: {sources} drives it, with a play of ±{gap:.3g} in what that is the rate of."
+                f" Pressed against what drives it, it would swing once in {2.0 * math.pi * turns:.3g} s; its own rate"
+                f" {fading}."
             )
         elif alone:
             said.append(

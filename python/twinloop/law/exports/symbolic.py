@@ -210,9 +210,13 @@ def _seen(text: str) -> int:
 def _notes(law: Law, digits: int) -> list[str]:
     """What belongs to the equations: conventions, actuators, hidden states."""
     lines = str(Equations(law, digits=digits)).splitlines()
-    filled = [
-        line for line in lines if line.startswith(tuple(f"d {name} / dt" for name in law.hidden_symbols))
-    ]
+    begins = tuple(f"d {name} / dt =" for name in law.held_symbols) + tuple(
+        f"{name} =" for name in law.hidden_symbols
+    )
+    filled, goes_on = [], False
+    for line in lines:
+        goes_on = line.startswith(begins) or (goes_on and line.startswith(" "))
+        filled += [line] if goes_on else []
     return [one_line(note) for note in [line[2:] for line in lines if line.startswith("# ")] + filled]
 
 
