@@ -127,6 +127,8 @@ HIDDEN = {
     "states": [],
     "settled": False,
     "turns": 0.0,
+    "gap": 0.0,
+    "damping": 0.0,
 }
 
 

@@ -34,12 +34,12 @@ FRONTS = {
     "faces/text": "controller table twin verdict words",
     "guard": "guarded",
     "identification": "identified identify outliers records remarks settings",
-    "identification/fit": "alternation committee fitting models predictions promises tuning",
+    "identification/fit": "alternation committee fitting models predictions promises settling tuning",
     "identification/proposals": (
-        "apart at_once bare contacts friction hidden lags parts second_look storage terms undisturbed"
+        "apart at_once bare contacts friction gaps hidden lags parts second_look storage terms undisturbed"
     ),
     "identification/search": (
-        "behind_a_law directions drives hidden moderation noise problem selection structure walks"
+        "behind_a_law directions drives hidden masses moderation noise problem selection structure walks"
     ),
     "identification/sensors": "chains euler_steps noise offsets reported",
     "identification/terms": (
@@ -47,8 +47,8 @@ FRONTS = {
         "priors sizes"
     ),
     "law": (
-        "accuracy actuation beginning equations expressions flight flown forms law levels noise parsing pieces reports "
-        "twin uncertainty"
+        "accuracy actuation beginning equations expressions flight flown forms law levels noise parsing pieces play "
+        "reports twin uncertainty"
     ),
     "law/exports": "environment export gymnasium_source taking",
     "law/exports/fmu": "running unit",

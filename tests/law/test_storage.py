@@ -291,7 +291,7 @@ def test_an_export_without_further_states_says_so():
         linear_twin("increment").export("python")
     for kind in ("latex", "sympy"):
         text = linear_twin(hidden=GAP).export(kind)
-        for line in ("d hidden_1_twist / dt = (rate/8", "hidden_1 = max(0, min(100*", "+ min(0, max(100*"):
+        for line in ("d hidden_1_twist / dt = (rate/8", "hidden_1 = max(0, min(100", "+ min(0, max(100"):
             assert line in text
     assert "hidden_2" in stored_twin().export("latex")
     assert "hidden_2" in stored_twin().export("sympy")

@@ -13,14 +13,15 @@ from twinloop_exam.zoo.plants import plant
 
 @pytest.fixture(scope="module")
 def learnt():
-    """One flight, gently excited, of a motor whose load stands behind play and is not logged."""
+    """One flight, gently excited, of a motor whose load stands behind play and is not logged, nor looked for."""
     motor = plant("motor-backlash-hidden")
     task, system = motor.asked, motor.make(4)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", tl.RemarkWarning)
         campaign = tl.Campaign(
             system.signals, controller=task.controller, initial_state=task.start, target_state=task.target,
-            duration=task.duration, weights=dict(task.weights), threads=1, options={"hold_back": False},
+            duration=task.duration, weights=dict(task.weights), threads=1,
+            options={"hold_back": False, "storage": False},
         )  # fmt: skip
         test = campaign.test(task.first)
         campaign.tell(test, system.run(test))

@@ -166,17 +166,14 @@ impl Stored {
 
     /// Fills those that a run begins with settled, so that they stay as they are under this inflow.
     fn settle(&mut self, inflow: &[f64]) {
-        for i in 0..self.now.len() {
-            if let Some(Partner { rate, play: Some(_), .. }) = self.partners[i]
-                && rate < 0.0
-            {
-                self.now[i] = inflow[i];
-            }
-        }
-        for i in (0..self.now.len()).filter(|i| self.inflows[i / self.lanes].settled) {
+        for (i, &flow) in inflow.iter().enumerate() {
+            let settled = self.inflows[i / self.lanes].settled;
             self.now[i] = match self.partners[i] {
-                Some(_) => self.solved(i, 0.0, 1.0, inflow),
-                None => inflow[i] * self.times[i],
+                // What is behind a gap moves along.
+                Some(Partner { rate, play: Some(_), .. }) if rate < 0.0 => flow,
+                Some(_) if settled => self.solved(i, 0.0, 1.0, inflow),
+                None if settled => flow * self.times[i],
+                _ => continue,
             };
         }
     }

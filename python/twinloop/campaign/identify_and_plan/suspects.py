@@ -2,8 +2,8 @@
 
 What a law lacks at single moments, such as a contact, is taken for white noise by whoever knows no other name for it.
 But noise that stirs a state in each period makes errors of prediction that are normal, and that nothing read or sent
-before foretells; an impact makes a few that are far larger than the others. Of a single flight neither can be told: a law
-that lacks something is bent until what is left looks like noise.
+before foretells; an impact makes a few that are far larger than the others. Of a single flight neither can be told: a
+law that lacks something is bent until what is left looks like noise.
 """
 
 from __future__ import annotations

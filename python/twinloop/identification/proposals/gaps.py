@@ -116,7 +116,7 @@ def _beside(told: Hypothesis, corner: Sequence[bool]) -> Hypothesis:
         one._replace(**{name: getattr(one, name) * factor for name, factor in changed.items()})
         for one in told.actuation.hidden
     )
-    stiffer, pool = 1.0 / changed["turns"] ** 2, told.pool
+    stiffer, pool = 1.0 / (changed["turns"] * changed["turns"]), told.pool
     sums = tuple(
         replace(
             found,
