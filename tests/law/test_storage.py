@@ -11,6 +11,7 @@ from twinloop.law.actuation import Actuation
 from twinloop.law.exports.augmented import augmented, begun
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
+from twinloop.law.linear.margins import closed_loops
 
 LINEAR = ["r6 = r0 * -3.0", "r7 = r1 * 0.4", "r6 = r6 - r7", "r7 = r2 * 5.0", "r6 = r6 + r7", "r7 = r4 * 2.0",
           "r6 = r6 + r7", "r7 = r5 * 14.0", "r6 = r6 - r7"]  # fmt: skip
@@ -141,6 +142,21 @@ def test_of_small_motions_the_linearisation_of_a_law_with_a_gap_flies_as_the_law
         (after(plant.state + step * e) - after(plant.state - step * e)) / (2 * step) for e in np.eye(4)
     ]
     np.testing.assert_allclose(plant.A, np.array(columns).T, rtol=1e-5, atol=1e-6)
+
+
+def test_a_twist_within_its_gap_makes_no_loop_unstable():
+    """At rest nothing presses: the twist moves nothing, and stays where it is."""
+    gap = [((), False, 0.0, 0.4, (1,), False, 0.12, 0.01, 0.05)] * 2
+    law = Law.of(linear_twin(hidden=gap).model, SIGNALS)
+    mixer = tl.controllers.Mixer([[1.0], [0.0]], offset=[0.0, 2.5], unit="N m")
+    family = tl.controllers.StateFeedback(
+        None, gains={"angle": (-9.0, 0.0), "rate": (-9.0, 0.0)}, output=mixer
+    ).bind(SIGNALS)
+    (loops,) = closed_loops([law], family, np.full(family.size, 0.1), np.zeros(2), None, "commands")
+    poles = loops.closed_poles()
+    assert len(poles) == 3 and (np.abs(poles) < 1.0).all()
+    # The mass alone, by its friction.
+    assert np.abs(poles - np.exp(-SIGNALS.dt / 0.4)).min() < 1e-6
 
 
 @pytest.mark.parametrize(

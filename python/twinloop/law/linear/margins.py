@@ -72,7 +72,10 @@ class Loops:
         self._seen = n_x
 
     def closed_poles(self) -> np.ndarray:
-        """Eigenvalues of the closed loop, in discrete time."""
+        """Eigenvalues of the closed loop, in discrete time.
+
+        Without that of a hidden state that moves nothing, such as the twist within a gap, which stays where it is.
+        """
         plant, law = self.plant, self.controller
         n, m = len(plant.A), len(law.A)
         seen = plant.C[: self._seen]
@@ -81,7 +84,9 @@ class Loops:
         whole[:n, n:] = plant.B @ law.C
         whole[n:, :n] = law.B @ seen
         whole[n:, n:] = law.A
-        return np.linalg.eigvals(whole)
+        moves = np.asarray((whole - np.diag(np.diag(whole))).any(axis=0))
+        moves[: self._seen] = moves[n:] = True
+        return np.linalg.eigvals(whole[np.ix_(moves, moves)])
 
     def response(self, loop: int, frequencies: Floats) -> np.ndarray:
         """L of one loop, broken where it leaves the controller, the others closed.
