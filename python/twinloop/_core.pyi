@@ -16,7 +16,8 @@ _Actuator = tuple[float, int, float | None, float]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
 _Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool, float, float, float]
 """Commands, whether squares fill it, the mean at rest (scaled; None: of the first period), time (s), states that fill
-it where no commands do, whether a run begins with it settled, and in which it turns with its neighbour (s; 0: none)."""
+it where no commands do, whether a run begins with it settled, in which it turns with its neighbour (s; 0: none), half
+of the gap between them (0: none), and the damping of what presses beyond it over its stiffness (s)."""
 _Motion = tuple[float, float, float]
 """Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
 _Chain = tuple[Sequence[int], Sequence[float], _Motion, str]

@@ -122,12 +122,12 @@ impl Actuation {
         self.ramping().zip(ramps).for_each(|(i, &ramp)| other.actuators[i].ramp = ramp);
         let (lags, rest) = times.split_at(self.actuators.len());
         let (rest, turns) = rest.split_at(self.hidden.len());
+        let (turns, gaps) = turns.split_at(self.hidden.iter().filter_map(Hidden::turns).count());
         let turning = other.hidden.iter_mut().filter_map(Hidden::turns_mut);
-        let number = self.hidden.iter().filter_map(Hidden::turns).count();
         turning.zip(turns).for_each(|(turns, &time)| *turns = time);
         let playing = other.hidden.iter_mut().filter_map(Hidden::play_mut);
         playing
-            .zip(turns[number..].chunks_exact(2))
+            .zip(gaps.chunks_exact(2))
             .for_each(|(play, gap)| *play = Play { half: gap[0], damping: gap[1] });
         other.actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
         other.hidden.iter_mut().zip(rest).for_each(|(hidden, &time)| hidden.time = time);

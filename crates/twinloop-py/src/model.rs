@@ -249,7 +249,8 @@ fn parts(hidden: &Hidden) -> HiddenParts {
 }
 
 /// Effects of commands (n, n_u) in their units behind actuators (lag, delay, rest, ramp), then the hidden states that they
-/// fill (commands, squared, rest, time, no states, not settled, no turns, no gap), at the start, the middle and the end of each period.
+/// fill (commands, squared, rest, time, no states, not settled, no turns, no gap), at the start, the middle and the end of
+/// each period.
 #[pyfunction]
 pub fn command_effects<'py>(
     py: Python<'py>,

@@ -105,6 +105,12 @@ def partners(hidden: Sequence[HiddenState]) -> list[int]:
     return found
 
 
+def twists(hidden: Sequence[HiddenState]) -> dict[int, int]:
+    """Places of twists before gaps, each with that of the rate of the mass behind it."""
+    beside = enumerate(partners(hidden))
+    return {place: partner for place, partner in beside if hidden[place].gap and partner > place}
+
+
 @dataclass(frozen=True)
 class Actuation(Recorded, kind="actuation"):
     """What a model sees of commands: their effects, then the states that they fill.

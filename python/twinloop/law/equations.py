@@ -279,7 +279,7 @@ class Equations:
             sides.append(("+", f"{least}(0, {nearer}({write(FIRM)}*({deep}), {deep} + {damped}))"))
         rate = self.law.signals.states[hidden.states[0]]
         parents = (state for state in self.law.signals.states if state.name == rate.derivative_of)
-        turned = "".join(f", ±{write(hidden.gap * rate.scale)} {of.unit} of {of.name}" for of in parents)
+        turned = "".join(f" (±{write(hidden.gap * rate.scale)} {of.unit} of {of.name})" for of in parents)
         note = (
             f"from 0 at the start; {name} is what presses beyond a gap, half of which is"
             f" {write(hidden.gap)}{turned}"

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from twinloop import _core
 from twinloop._ground.values import Value
-from twinloop.law.actuation import Actuation, partners
+from twinloop.law.actuation import Actuation, twists
 from twinloop.law.expressions import INPUT, UPRIGHT, Expressions, Node
 from twinloop.law.levels import Levels
 from twinloop.law.reports import Reports, reports_of, with_reports
@@ -96,12 +96,9 @@ class Law(Value):
     @property
     def held_symbols(self) -> tuple[str, ...]:
         """Names of what the hidden states hold from period to period: of what presses beyond a gap, the twist."""
-        hidden = self.actuation.hidden
-        symbols = zip(self.hidden_symbols, hidden, partners(hidden), strict=True)
-        return tuple(
-            twist_name(symbol) if one.gap and partner > place else symbol
-            for place, (symbol, one, partner) in enumerate(symbols)
-        )
+        before = twists(self.actuation.hidden)
+        symbols = enumerate(self.hidden_symbols)
+        return tuple(twist_name(symbol) if place in before else symbol for place, symbol in symbols)
 
     @property
     def symbols(self) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ pub(crate) struct Storage<V> {
 
 impl<V: Vector> Storage<V> {
     /// At the start of a run, of those among some hidden states that states fill, if there are any; the times of all, then
-    /// those in which they turn, then their gaps, are given lane by lane, and steps of the integrator in s, `staged` if they are of Runge and
-    /// Kutta.
+    /// those in which they turn, then their gaps, are given lane by lane, and steps of the integrator in s, `staged` if they
+    /// are of Runge and Kutta.
     #[inline(never)]
     pub fn new(
         hidden: &[Hidden],

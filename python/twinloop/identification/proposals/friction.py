@@ -20,9 +20,9 @@ from twinloop.identification.fit.promises import promises
 from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
-from twinloop.identification.search.noise import RIDGE, calm, still
+from twinloop.identification.search.noise import calm, still
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.structure import Sum, priced, prices
+from twinloop.identification.search.structure import Sum, priced, prices, weighed
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
 
 WORTH = 20.0
@@ -142,11 +142,10 @@ def _tuned(context: Context, problem: Problem, hypothesis: Hypothesis, i: int, n
     assert hypothesis.fit is not None
     known, sums = hypothesis.sums[i], list(hypothesis.sums)
     terms = problem.usable([*known.weights, node])
-    gram = problem.gram(known.chain, problem.values(terms))
-    solved = gram.solve(list(range(len(terms))), RIDGE)
-    if solved is None:
+    weights = weighed(problem, known.chain, terms)
+    if weights is None:
         return hypothesis
-    sums[i] = replace(known, weights=dict(zip(terms, map(float, solved[0]), strict=True)), others=[])
+    sums[i] = replace(known, weights=weights, others=[])
     candidates = hypothesis.candidates.with_terms([node])
     more = replace(hypothesis, candidates=candidates, sums=tuple(sums), fit=None)
     fit, _ = tune(

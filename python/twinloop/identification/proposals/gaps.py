@@ -21,9 +21,9 @@ from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.storage import Screen, Sources, at_once, shows
 from twinloop.identification.search.masses import masses_behind
-from twinloop.identification.search.noise import RIDGE, first_noise, still
+from twinloop.identification.search.noise import first_noise, still
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.structure import Sum, prices, usable_among
+from twinloop.identification.search.structure import Sum, prices, usable_among, weighed
 from twinloop.identification.terms.friction import entered, frictions
 from twinloop.law.actuation import HiddenState
 
@@ -51,7 +51,9 @@ FINALISTS = 3
 
 def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with the best mass behind a gap, fitted; none where only noise is left, or none pays."""
-    if not context.options.storage or hypothesis.fit is None or hypothesis.form != "acceleration":
+    driven = [found.chain.states[0] for found in hypothesis.sums]
+    rates = [i for i, state in enumerate(driven) if context.signals.states[state].derivative_of is not None]
+    if not (context.options.storage and rates) or hypothesis.fit is None or hypothesis.form != "acceleration":
         return
     problem = Problem(context, hypothesis)
     quiet = still(problem, (found.chain for found in hypothesis.sums))
@@ -63,7 +65,7 @@ def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     for variant in (*at_once(context, bare), bare):
         screen, short = Screen.of(context, variant), _short(variant)
         looked = screen if short is variant else Screen.of(context, short)
-        for place in range(len(screen.hypothesis.sums)):
+        for place in rates:
             pairs = [near for mass in _masses(looked, place) for near in _near(mass)]
             several = [fitted(context, one) for pair in pairs for one in _described(screen, pair, place)]
             if not several:
@@ -172,9 +174,8 @@ def _closed(context: Context, told: Hypothesis, place: int) -> Iterator[Hypothes
     tried = replace(begun, actuation=replace(begun.actuation, hidden=pair), fit=None)
     problem, kept = Problem(context, tried), [term for term in known.weights if not pool.is_hidden(term)]
     usable = problem.usable(list(dict.fromkeys([*kept, *own.states, pool.hidden(0), pool.hidden(1)])))
-    solved = problem.gram(known.chain, problem.values(usable)).solve(list(range(len(usable))), RIDGE)
-    if solved is not None and shows(pair, context.signals.dt):
-        weights = dict(zip(usable, solved[0].tolist(), strict=True))
+    weights = weighed(problem, known.chain, usable)
+    if weights is not None and shows(pair, context.signals.dt):
         yield _with_sum(tried, place, replace(known, weights=weights, others=[]))
 
 
@@ -201,18 +202,15 @@ def _described(screen: Screen, pair: Sources, place: int) -> Iterator[Hypothesis
     pool, found = tried.pool, tried.sums[place]
     usable = problem.usable([pool.one, *range(pool.inputs), pool.hidden(0)])
     chain = first_noise(problem, found.chain, usable, gusts=False)
-    solved = problem.gram(chain, problem.values(usable)).solve(list(range(len(usable))), RIDGE)
-    if solved is not None:
-        weights = dict(zip(usable, solved[0].tolist(), strict=True))
+    weights = weighed(problem, chain, usable)
+    if weights is not None:
         yield _with_sum(tried, place, replace(found, chain=chain, weights=weights, others=[]))
 
 
 def _masses(screen: Screen, place: int) -> list[HiddenState]:
-    """Masses that one of a screen's sums drives, where that is of a rate, which explain most of what is left of it."""
+    """Masses that the rate drives whose law is one of a screen's sums, which explain most of what is left of it."""
     hypothesis, context, chain = screen.hypothesis, screen.context, screen.hypothesis.sums[place].chain
     rate = chain.states[0]
-    if context.signals.states[rate].derivative_of is None:
-        return []
 
     def behind(turns: float, gap: float, damping: float, time: float) -> HiddenState:
         return HiddenState((), False, 0.0, time, (rate,), False, turns, gap, damping)

@@ -12,6 +12,7 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log, power
 from twinloop.identification.search.moderation import precisions
+from twinloop.identification.search.noise import RIDGE
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.subsets import Judge, Judged
 from twinloop.identification.search.walks import Subsets, Walks
@@ -191,6 +192,13 @@ def search_known(
         one.gram = gram
     _choose(problem, usable, searched, _walk_of(walks, 0, problem))
     return [_sum(problem, usable, one) for one in searched]
+
+
+def weighed(problem: Problem, chain: Chain, usable: Sequence[int]) -> Weights | None:
+    """Weights of terms that were found usable, all of which explain a chain together; None where they are collinear."""
+    gram = problem.gram(chain, problem.values(usable))
+    solved = gram.solve(list(range(len(usable))), RIDGE)
+    return None if solved is None else dict(zip(usable, solved[0].tolist(), strict=True))
 
 
 def usable_among(problem: Problem, terms: Sequence[int], known: Sequence[Sum | None]) -> list[int]:

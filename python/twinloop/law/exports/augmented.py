@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.law.actuation import Actuation, HiddenState, partners
+from twinloop.law.actuation import Actuation, HiddenState, partners, twists
 from twinloop.law.expressions import INPUT, Expressions
 from twinloop.law.law import Law
 from twinloop.law.linear.storage import settled
@@ -25,14 +25,13 @@ def augmented(law: Law) -> Law:
     stored, signals = law.actuation.stored, law.signals
     n_x, count = signals.n_x, len(stored)
     names = law.held_symbols[len(law.held_symbols) - count :]
-    beside = partners(stored)
+    before = twists(stored)
     added = [
-        _held(name, one, beside[place] < place)
+        _held(name, one, place in before.values())
         for place, (name, one) in enumerate(zip(names, stored, strict=True))
     ]
     expressions, made = Expressions(), dict[int, int]()
-    presses = {place: place - law.inputs + count for place in range(law.inputs - count, law.inputs)}
-    presses = {place: of for place, of in presses.items() if stored[of].gap and partners(stored)[of] > of}
+    presses = {law.inputs - count + twist: twist for twist in before}
 
     def moved(place: int) -> int:
         """An input's place behind the new states, or among them."""
@@ -66,7 +65,8 @@ def begun(law: Law, state: Floats) -> Floats:
     stored = law.actuation.stored
     still = settled(law, state)[len(law.actuation.hidden) - len(stored) :]
     # What is behind a gap moves along.
-    along = [one.settled or (bool(one.gap) and partners(stored)[i] < i) for i, one in enumerate(stored)]
+    behind = twists(stored).values()
+    along = [one.settled or place in behind for place, one in enumerate(stored)]
     return np.concatenate([state, np.where(along, still, 0.0)])
 
 
@@ -99,7 +99,7 @@ def _slope(expressions: Expressions, signals: Signals, stored: Sequence[HiddenSt
         return expressions.input(signals.n_x + of)
 
     faded = make("/", itself(place), constant(one.time))
-    if one.gap and partner > place:
+    if place in twists(stored):
         return make("-", _level(expressions, signals, one), itself(partner))
     if one.gap:
         pressed = _press(expressions, signals, stored, partner)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.law.actuation import partners
+from twinloop.law.actuation import partners, twists
 from twinloop.law.law import Law
 from twinloop.law.linear.dual import Dual
 from twinloop.law.play import FIRM, press
@@ -19,10 +19,10 @@ def fading(law: Law) -> Floats:
     stored = law.actuation.stored
     rates = np.diag([1.0 / one.time for one in stored])
     for place, partner in enumerate(partners(stored)):
-        if partner > place and stored[place].gap:
-            rates[place, [place, partner]] = 0.0, 1.0
-        elif partner != place and not stored[place].gap:
+        if partner != place and not stored[place].gap:
             rates[place, partner] = (1.0 if partner > place else -1.0) / stored[place].turns
+    for twist, rate in twists(stored).items():
+        rates[twist, [twist, rate]] = 0.0, 1.0
     return rates
 
 
@@ -35,8 +35,9 @@ def filling(law: Law, states: Dual) -> Dual:
     """
     stored = law.actuation.stored
     values, slopes = np.zeros(len(stored)), np.zeros((len(stored), states.slopes.shape[1]))
-    for row, (one, partner) in enumerate(zip(stored, partners(stored), strict=True)):
-        if one.gap and partner < row:
+    behind = twists(stored).values()
+    for row, one in enumerate(stored):
+        if row in behind:
             continue
         scales = np.array([law.signals.states[place].scale for place in one.states])
         given = states.rows(one.states) * (1.0 / scales)
@@ -56,11 +57,9 @@ def seen(law: Law, states: Dual, held: Dual) -> Dual:
     """
     stored, found = law.actuation.stored, held
     turning = filling(law, states) - held.mapped(fading(law))
-    for place, partner in enumerate(partners(stored)):
-        if partner > place and stored[place].gap:
-            found = found.put(
-                [place], _pressed(held.rows([place]), turning.rows([place]), *stored[place][-2:])
-            )
+    for twist in twists(stored):
+        one, here = stored[twist], [twist]
+        found = found.put(here, _pressed(held.rows(here), turning.rows(here), one.gap, one.damping))
     return found
 
 
@@ -74,10 +73,9 @@ def moved(law: Law, states: Dual, held: Dual) -> Dual:
     """
     stored, found = law.actuation.stored, filling(law, states) - held.mapped(fading(law))
     presses = seen(law, states, held)
-    for place, partner in enumerate(partners(stored)):
-        if partner < place and stored[place].gap:
-            pressed = presses.rows([partner]) * (1.0 / (stored[place].turns * stored[place].turns))
-            found = found.put([place], found.rows([place]) + pressed)
+    for twist, rate in twists(stored).items():
+        pressed = presses.rows([twist]) * (1.0 / (stored[rate].turns * stored[rate].turns))
+        found = found.put([rate], found.rows([rate]) + pressed)
     return found
 
 
@@ -93,10 +91,8 @@ def settled(law: Law, state: Floats) -> Floats:
     stored = law.actuation.stored
     filled = filling(law, Dual(state, np.zeros((len(state), 0)))).values
     fades, bound = fading(law), filled
-    beside = [(i, j) for i, j in enumerate(partners(stored)) if j > i and stored[i].gap]
-    for twist, rate in beside:
+    for twist, rate in twists(stored).items():
         # Their own equation is no linear one.
-        fades, bound = fades.copy(), bound.copy()
         fades[[twist, rate]] = 0.0
         fades[twist, twist] = fades[rate, rate] = 1.0
         bound[rate] = filled[twist]
