@@ -99,8 +99,8 @@ impl Hidden {
             return Ok(self);
         }
         invalid(format!(
-            "hidden state: expected some of {commands} commands or of {states} states, a finite rest, and times above \
-             0 s, found {self:?}"
+            "hidden state: expected some of {commands} commands or of {states} states, a finite rest, times above 0 s, and \
+             a gap above 0 only between two that turn and begin empty, found {self:?}"
         ))
     }
 
