@@ -105,6 +105,9 @@ ABLATIONS: dict[str, Ablation] = {
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),
+    "inside": Ablation(
+        "flights learnt only as far as they were inside, where no law explains all of them", {"inside": False}
+    ),
     "tame": Ablation("the law known before, tuned again, kept where the new one is wilder", {"tame": False}),
     "rough": Ablation("a linear law beside one that does not explain the flights", {"rough": False}),
     "causes": Ablation("disturbances separated from model errors", {"causes": False}),

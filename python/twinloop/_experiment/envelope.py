@@ -53,3 +53,21 @@ def readings_leave(usages: Floats) -> bool:
     """
     beyond = outside(usages)
     return bool((beyond[1:] & beyond[:-1]).any())
+
+
+def gone_from(usages: Floats) -> int | None:
+    """The first reading from which a flown flight is outside for good: two in a row, and most of those that are left.
+
+    A flight that overshoots comes back; one that has fallen, stalled or hit something does not.
+
+    Args:
+        usages: of the envelope at each reading (n + 1,).
+
+    Returns:
+        Its place; None where there is none.
+    """
+    beyond = outside(usages)
+    left = np.arange(len(beyond), 0, -1)
+    most = 2 * beyond[::-1].cumsum()[::-1] > left
+    gone = beyond[:-1] & beyond[1:] & most[:-1]
+    return int(gone.argmax()) if gone.any() else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from twinloop._experiment.envelope import readings_leave, usages_of
+from twinloop._experiment.envelope import gone_from, readings_leave, usages_of
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.data.gains import FlownOtherwise
@@ -90,6 +90,11 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     def left_envelope(self) -> bool:
         """Whether two readings in a row were outside; a single one may be the noise of a sensor."""
         return readings_leave(self._usages())
+
+    @property
+    def gone_from(self) -> int | None:
+        """The first reading from which it is outside of the envelope for good; None where it comes back or stays."""
+        return gone_from(self._usages())
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""

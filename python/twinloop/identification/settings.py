@@ -90,6 +90,8 @@ class IdentificationOptions:
             drawn from the box of gains.
         earlier_twin: whether the earlier twin is kept if it follows all flights and the new
             one does not.
+        inside: whether flights that left their envelope for good are learnt as far as they were inside, where no law
+            explains all of them.
         tame: whether the law known before, tuned on all flights, is kept if the new one diverges under more controllers
             drawn from the box of gains and follows the flights hardly better.
         rough: whether a linear law is learnt beside one that does not explain the flights.
@@ -146,6 +148,7 @@ class IdentificationOptions:
     steady: bool = True
     lasts: bool = True
     earlier_twin: bool = True
+    inside: bool = True
     tame: bool = True
     rough: bool = True
     causes: bool = True

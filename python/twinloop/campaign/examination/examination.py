@@ -60,7 +60,8 @@ class Earlier:
     Args:
         twins: that were known earlier, the oldest first.
         error: of a model on an experiment, over the whole of it.
-        innovations: of each experiment that was learnt (n + 1, n_x), whitened; None where there are none.
+        innovations: of each experiment that was learnt, as far as it was (n + 1, n_x), whitened; None where there are
+            none.
         rivals: sums of terms that were considered, the chosen ones among them.
     """
 
@@ -155,7 +156,10 @@ class Examination:
         """Of each state's innovations with each earlier command (n_x, n_u, lags); None as for `autocorrelation`."""
         if self.innovations is None or self._lags == 0:
             return None
-        commands = [run.trajectory.commands for run in self.experiments[: len(self.innovations)]]
+        commands = [
+            run.trajectory.commands[: len(found) - 1]
+            for run, found in zip(self.experiments, self.innovations, strict=False)
+        ]
         return crosscorrelation([found[1:] for found in self.innovations], commands, self._lags)
 
     @cached_property

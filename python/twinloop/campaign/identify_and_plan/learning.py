@@ -15,6 +15,7 @@ from twinloop.campaign.data.reports import reports_in
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, drawn_controllers, lasting_under
+from twinloop.campaign.identify_and_plan.inside import enough_inside, inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.lessons import lesson_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
@@ -36,6 +37,8 @@ PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
 AGAIN = 2_000_000
 """Added likewise where the law known before is tuned again."""
+INSIDE_ONLY = 3_000_000
+"""Added likewise where flights are learnt only as far as they were inside their envelope."""
 ROUGH = serious(
     "rough",
     "No law explains the flights, and a linear one follows them in free run, or predicted later ones, better than"
@@ -67,6 +70,23 @@ class Two:
 
     laws: tuple[TwoLaws, ...] = ()
     rough: Identified | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What is learnt from, and held against what is learnt.
+
+    Args:
+        flights: without single readings that are wrong.
+        selected: those, or parts of them, that are learnt from.
+        identify: identification of these; what it lacks are options and a number.
+        answered: holds what was identified against the flights.
+    """
+
+    flights: Sequence[Experiment]
+    selected: Sequence[Selected]
+    identify: Callable[..., Identified]
+    answered: Callable[..., Answer]
 
 
 @dataclass(frozen=True)
@@ -102,12 +122,7 @@ class Learner:
         """
         experiments = len(book.experiments)
         needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
-        selected = learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
-        identify = self._identification(selected, self._drawn(book.experiments, 3))
-        flights = without_wrong_readings(book.experiments, self.setup.signals)
-        answered = partial(
-            Answer.of, flights=flights, setup=self.setup, options=self.options, workers=self.workers
-        )
+        told = self._told(book.experiments)
         earlier = None if asked is None else asked.identified
         begun = under_way
 
@@ -116,29 +131,37 @@ class Learner:
             begun = so_far
             keep(so_far)
 
-        answer = answered(
-            identify(self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=kept)
+        answer = told.answered(
+            told.identify(
+                self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=kept
+            )
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
-            answer = or_known_before(answer, earlier, answered)
-        everywhere = self._drawn(flights, 0)
-        doubted = self._doubted(answer, flights, everywhere)
+            answer = or_known_before(answer, earlier, told.answered)
+        doubted = self._doubted(answer, told)
+        if doubted and self.options.inside:
+            found = self._inside(book.experiments, told, earlier)
+            if found is not None:
+                told, answer, begun = found
+                doubted = self._doubted(answer, told)
         if self.options.tame and earlier is not None:
             # Readings that are wrong, late ones and the form are those of the search anew.
             first_step = None if begun is None else replace(begun, searches=())
             known_again = partial(
-                identify, self.options.as_known, iteration=AGAIN + experiments, under_way=first_step
+                told.identify, self.options.as_known, iteration=AGAIN + experiments, under_way=first_step
             )
-            tamer = self._tamer(answer, doubted, earlier, known_again, answered, flights)
+            tamer = self._tamer(answer, doubted, earlier, known_again, told)
             if tamer is not None:
-                answer, doubted = tamer, self._doubted(tamer, flights, everywhere)
+                answer, doubted = tamer, self._doubted(tamer, told)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if self.options.plain != self.options and doubted:
-            rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
-            answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
+            rough = with_remark(told.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
+            answer, two = self._of_two(answer, told.answered(rough, number=2), two, told)
         identified = answer.identified
         model = None if earlier is None else earlier.model
-        lesson = lesson_of(answer, is_rough(identified), book, flights, selected, model, self.workers)
+        lesson = lesson_of(
+            answer, is_rough(identified), book, told.flights, told.selected, model, self.workers
+        )
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )
@@ -157,7 +180,37 @@ class Learner:
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
         )
 
-    def _doubted(self, answer: Answer, flights: Sequence[Experiment], everywhere: Floats) -> bool:
+    def _told(self, experiments: Sequence[Experiment]) -> Told:
+        """What is learnt from experiments, and what answers are held against."""
+        selected = learnt_from(experiments, self.options.most_readings, self.setup.signals)
+        flights = without_wrong_readings(experiments, self.setup.signals)
+        return Told(
+            flights,
+            selected,
+            self._identification(selected, self._drawn(experiments, 3)),
+            partial(Answer.of, flights=flights, setup=self.setup, options=self.options, workers=self.workers),
+        )
+
+    def _inside(
+        self, experiments: Sequence[Experiment], told: Told, earlier: Identified | None
+    ) -> tuple[Told, Answer, UnderWay | None] | None:
+        """What is learnt of flights as far as they were inside their envelope, and the search for it.
+
+        None where none has left it for good, or where so little is left of them that more is lost than won.
+        """
+        kept = inside(experiments)
+        if all(part is run for part, run in zip(kept, experiments, strict=True)):
+            return None
+        told, begun = self._told(kept), list[UnderWay]()
+        found = told.identify(
+            self.options, iteration=INSIDE_ONLY + len(experiments), earlier=earlier, keep=begun.append
+        )
+        answer = told.answered(found, number=5)
+        if not (answer.explained or enough_inside(experiments, kept)):
+            return None
+        return told, answer, begun[-1] if begun else None
+
+    def _doubted(self, answer: Answer, told: Told) -> bool:
         """Whether a law does not explain the flights; or only what may be a model error explains them, and it is wild.
 
         Whatever may disturb explains much. A law that needs it, and diverges under most controllers of the box, such as
@@ -165,8 +218,9 @@ class Learner:
         """
         if not answer.explained:
             return True
+        everywhere = self._drawn(told.flights, 0)
         (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
-        return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
+        return 2 * lasting < DRAWN and bool(answer.misses(told.flights, self.setup, self.workers))
 
     def _tamer(
         self,
@@ -174,11 +228,10 @@ class Learner:
         doubted: bool,
         known: Identified,
         known_again: Callable[..., Identified],
-        answered: Callable[..., Answer],
-        flights: Sequence[Experiment],
+        told: Told,
     ) -> Answer | None:
         """The law known before, tuned on all flights, where it is tamer than that of an answer and follows nearly."""
-        everywhere = self._drawn(flights, 2)
+        everywhere = self._drawn(told.flights, 2)
 
         def lasting(other: Identified) -> Lasting:
             models = [answer.identified.model, other.model]
@@ -187,7 +240,7 @@ class Learner:
         if not is_wilder(answer.identified, known, lasting(known), doubted):
             return None
         again = known_again(earlier=known)
-        tame, both = answered(with_remark(again, TAME), number=4), lasting(again)
+        tame, both = told.answered(with_remark(again, TAME), number=4), lasting(again)
         wilder = is_wilder(answer.identified, again, both, doubted)
         return tame.with_doubtful_disturbances() if wilder and follows_nearly(tame, answer, both) else None
 
@@ -200,17 +253,16 @@ class Learner:
         answer: Answer,
         rough: Answer,
         before: Two,
-        answered: Callable[..., Answer],
-        flights: Sequence[Experiment],
+        told: Told,
     ) -> tuple[Answer, Two]:
         """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds."""
         if self.options.earlier_twin and before.rough is not None:
-            rough = or_lasted_before(rough, before.rough, answered)
-        both = TwoLaws(len(flights), answer.identified.model, rough.identified.model)
+            rough = or_lasted_before(rough, before.rough, told.answered)
+        both = TwoLaws(len(told.flights), answer.identified.model, rough.identified.model)
         now = Two((*before.laws, both), rough.identified)
-        foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
+        foretold = better_foretold(now.laws, told.flights, self.setup.limits, self.workers)
         laws = [both.nonlinear, both.linear]
-        lasting = lasting_under(laws, self.setup, self._drawn(flights, 1), self.workers)
+        lasting = lasting_under(laws, self.setup, self._drawn(told.flights, 1), self.workers)
         return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
 
     def _identification(self, selected: Sequence[Selected], everywhere: Floats) -> partial[Identified]:

@@ -15,6 +15,7 @@ from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of
 from twinloop.campaign.identify_and_plan.elsewhere import elsewhere
+from twinloop.campaign.identify_and_plan.inside import said_inside
 from twinloop.campaign.identify_and_plan.outputs_alone import outputs_alone
 from twinloop.campaign.identify_and_plan.selection import Selected, shortened
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
@@ -37,7 +38,7 @@ def lesson_of(
         answer: what was identified, beside the flights.
         rough: whether it is a law of linear terms beside one that does not explain the flights.
         book: of the campaign.
-        flights: of the book, without single readings that are wrong.
+        flights: of the book, as far as they were learnt, without single readings that are wrong.
         selected: what was learnt from.
         before: the law that was known before the last of the flights; None: none was.
         workers: how the work is carried out.
@@ -68,6 +69,7 @@ def lesson_of(
         follows=answer.follows,
         remarks=(
             *identified.remarks,
+            *said_inside(book.experiments, flights, signals.dt),
             *shortened(selected, signals.dt),
             *stand_ins(identified.actuation, signals, explained),
             *outputs_alone(
@@ -95,7 +97,7 @@ def findings(
     Args:
         answer: to be looked at.
         book: of the campaign.
-        flights: of the book, without single readings that are wrong.
+        flights: of the book, as far as they were learnt, without single readings that are wrong.
         pieces: steps of those in which each experiment is followed.
         before: the law that was known before the last of the flights; None: none was.
         workers: how the work is carried out.

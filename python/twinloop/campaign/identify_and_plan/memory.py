@@ -9,6 +9,7 @@ from typing import ClassVar
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero
 from twinloop.campaign.history import Lesson
+from twinloop.campaign.identify_and_plan.inside import INSIDE
 from twinloop.campaign.identify_and_plan.misses import FREE_RUN
 from twinloop.campaign.identify_and_plan.two_laws import TwoLaws
 from twinloop.identification.identified import Identified
@@ -84,6 +85,11 @@ class Learnt(Recorded, kind="learnt"):
     def explained(self) -> bool:
         """Whether a law explains the flights: where none does, the best model of either kind was kept of them."""
         return not self.two_laws or self.two_laws[-1].experiments != self.experiments
+
+    @property
+    def inside(self) -> bool:
+        """Whether flights were learnt only as far as they were inside their envelope."""
+        return any(remark.code == INSIDE for remark in self.lessons[-1].remarks)
 
     @property
     def misses(self) -> bool:

@@ -19,6 +19,7 @@ from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice
+from twinloop.campaign.identify_and_plan.inside import inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -237,7 +238,9 @@ class IdentifyAndPlan:
         """Where the flights have been, and where the task leads."""
         setup = self.setup
         ends = np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
-        return Seen(standing.read_in(book, book.experiments), np.stack([ends.min(axis=0), ends.max(axis=0)]))
+        return Seen(
+            standing.read_in(book, inside(book.experiments)), np.stack([ends.min(axis=0), ends.max(axis=0)])
+        )
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
