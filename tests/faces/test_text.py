@@ -192,5 +192,5 @@ def test_hidden_states_are_said_one_by_one_and_a_mass_on_a_spring_once():
 def test_a_mass_behind_a_gap_is_said_once_with_its_play():
     one = {"commands": [], "states": ["rate"], "squared": False, "time": 0.7, "turns": 0.025, "gap": 0.06}
     (said,) = hidden_states([one, one])
-    assert "behind a gap: rate drives it, with a play of ±0.06 in what that is the rate of" in said
+    assert "behind a gap: rate drives it, with a play of ±0.06 (unit of rate, times s)" in said
     assert "swing once in 0.157 s; its own rate decays to 1/e in 0.7 s" in said
