@@ -124,8 +124,8 @@ def hidden_states(states: Sequence[Mapping[str, Any]]) -> list[str]:
         elif alone and gap:
             said.append(
                 f"Hidden mass behind a gap: {sources} drives it, with a play of ±{gap:.3g} (unit of {sources},"
-                f" times s). Pressed against what drives it, it would swing once in {2.0 * math.pi * turns:.3g} s; its own rate"
-                f" {fading}."
+                f" times s). Pressed against what drives it, it would swing once in {2.0 * math.pi * turns:.3g} s; its"
+                f" own rate {fading}."
             )
         elif alone:
             said.append(
