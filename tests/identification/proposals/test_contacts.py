@@ -118,6 +118,62 @@ def test_play_is_found_between_two_states():
     assert free_run_error(twin, behind_play, (0.0,) * 4, pushed(0.4, 3), SHAFT) < 0.02
 
 
+CORNER = tl.Signals(
+    [
+        tl.State("body", "m", 0.1),
+        tl.State("wheel", "m", 0.1),
+        tl.State("body_rate", "m/s", 1.0, derivative_of="body"),
+        tl.State("wheel_rate", "m/s", 1.0, derivative_of="wheel"),
+    ],
+    [tl.Command("actuator", "N", (-2.0, 2.0))],
+    DT,
+)
+BUMP, REBOUND, ROAD = 2.0, 6.0, 0.02
+
+
+def on_a_damper(x, u):
+    """A body on a wheel, whose damper holds back three times as much apart as together, and whose tyre can lift off."""
+    apart = x[2] - x[3]
+    pull = 40.0 * (x[0] - x[1]) + (REBOUND if apart > 0.0 else BUMP) * apart - 4.0 * u
+    return np.array([x[2], x[3], -pull, 4.0 * pull - 500.0 * min(x[1], ROAD) - 4.0 * x[3]])
+
+
+def test_a_damper_is_found_that_holds_back_less_one_way_and_a_tyre_that_lifts_off():
+    runs = [
+        flown(on_a_damper, (0.05, 0.0, 0.0, 0.0), pushed(2.0, seed), CORNER, [1e-4, 1e-4, 1e-3, 1e-3], seed)
+        for seed in (1, 2)
+    ]
+    assert all(0.1 < np.mean(run.states[:, 1] > ROAD) < 0.9 for run in runs)
+
+    twin = tl.identify(runs, CORNER, seed=0)
+    without = tl.identify(runs, CORNER, seed=0, options={"contacts": False})
+
+    unseen = pushed(2.0, 3)
+    error = free_run_error(twin, on_a_damper, (0.05, 0.0, 0.0, 0.0), unseen, CORNER)
+    assert error < 1e-4
+    assert error < 0.1 * free_run_error(without, on_a_damper, (0.05, 0.0, 0.0, 0.0), unseen, CORNER)
+    for side in (1.0, -1.0):
+        linear = twin.linearise(at=np.array([0.0, 0.0, 0.3 * side, 0.0]), command=np.zeros(1))
+        np.testing.assert_allclose(
+            linear.A[2, 2:], np.array([-1.0, 1.0]) * (REBOUND if side > 0.0 else BUMP), rtol=0.02
+        )
+
+
+def test_hinges_of_rates_are_at_rest_and_where_valves_open_and_none_of_what_never_turned():
+    stream = np.random.default_rng(0)
+    rows = np.column_stack([stream.uniform(-1.0, 1.0, (200, 3)), stream.uniform(0.2, 1.0, (200, 2))])
+    found = [hinge for hinge in hinges(CORNER, rows) if {2, 3} & set(hinge.inputs)]
+    speeds = {(2,): rows[:, 2], (3,): rows[:, 3], (2, 3): rows[:, 2] - rows[:, 3]}
+
+    assert {hinge.inputs for hinge in found} == set(speeds) and all(not hinge.rates for hinge in found)
+    for inputs, values in speeds.items():
+        own = [hinge for hinge in found if hinge.inputs == inputs]
+        rest = [hinge for hinge in own if hinge.place == 0.0]
+        assert [hinge.side for hinge in rest] == ([1] if values.min() < 0.0 else [])
+        # Each is 0 for some of the readings, and grows for others.
+        assert all(0 < (hinge.side * (values - hinge.place) > 0.0).sum() < len(rows) for hinge in own)
+
+
 def test_a_limited_power_is_found():
     road = tl.Signals([tl.State("speed", "m/s", 10.0)], [tl.Command("throttle", "1", (0.0, 1.0))], DT)
 
@@ -295,9 +351,10 @@ def test_hinges_do_not_depend_on_units(factor, least):
     values = []
     for signals, scale in ((RAIL, 1.0), (other, factor)):
         pool, seen = Pool(3), inputs * [scale, scale, 1.0]
-        terms = [entered(pool, hinge, 100) for hinge in hinges(signals, seen)]
+        found = hinges(signals, seen)
+        terms = [entered(pool, hinge, 100) for hinge in found]
         # Times a rate; a power is over the speed again.
-        rated = [1 in pool.leaves(term) and 2 not in pool.leaves(term) for term in terms]
+        rated = [bool(hinge.rates) for hinge in found]
         values.append(pool.values(terms, seen) / np.where(rated, scale, 1.0))
     np.testing.assert_array_equal(*values)
 

@@ -28,9 +28,21 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if not (options.contacts and options.libraries) or hypothesis.fit is None:
         return
     problem = Problem(context, hypothesis)
-    quiet = still(problem, (found.chain for found in hypothesis.sums))
     # A hinge would evade the bounds of what it is made of.
-    if problem.priors.bounds or (quiet and hypothesis.fit.stable):
+    if problem.priors.bounds:
+        return
+    quiet = still(problem, (found.chain for found in hypothesis.sums))
+    bases = [] if quiet and hypothesis.fit.stable else [hypothesis, *_without_lags(context, hypothesis)]
+    # Terms of higher rungs and evolved ones may stand in for what begins at a place: it is looked for beside few terms.
+    terms = [term for found in hypothesis.sums for term in found.weights]
+    if (
+        not bases
+        and context.several
+        and context.signals.kinematics is None
+        and hypothesis.pool.rung(terms) > 0
+    ):
+        bases = [replace(hypothesis, sums=hypothesis.from_above)] if hypothesis.from_above else []
+    if not bases:
         return
     context.watch("terms")
     every = hinges(context.signals, problem.stages.start)
@@ -38,7 +50,7 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         # In one short run a bend of what drives a chain stands in for any contact.
         every += limits(_drives(context, hypothesis, problem), problem.stages.start)
     searches, start = 0, hypothesis.start + CONTACTS
-    for variant in (hypothesis, *_without_lags(context, hypothesis)):
+    for variant in bases:
         tried = replace(variant, start=start, searches=searches)
         few, searches = _screened(context, tried, every), searches + 1
         if not few:

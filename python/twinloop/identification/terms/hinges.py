@@ -80,9 +80,9 @@ def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
     """
     kinds = list(_kinds(signals, [i for i in range(signals.n_x) if _keeps_away_from_zero(inputs[:, i])]))
     count = min(PLACES, MOST // (2 * max(1, len(kinds))))
-    found = []
+    found = list(_dampers(signals, inputs))
     for kind in kinds:
-        values = (inputs[:, list(kind.inputs)] * kind.weights).sum(axis=1)
+        values = _values(kind, inputs)
         if kind.over is not None:
             values = values * (inputs[:, kind.over[0]] / kind.over[1])
         places = _places(values if kind.side else np.abs(values), count)
@@ -122,7 +122,9 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
     speed = None if hinge.over is None else pool.share(*hinge.over)
     if speed is not None:
         coordinate = pool.product(coordinate, speed)
-    above = pool.add("max", pool.add("-", coordinate, hinge.place), 0.0)
+    # At rest there is no place that could be tuned.
+    depth_above = pool.add("-", coordinate, hinge.place) if hinge.place else coordinate
+    above = pool.add("max", depth_above, 0.0)
     place = hinge.place if hinge.side else -hinge.place
     below = pool.add("max", pool.add("-", pool.constant(place), coordinate), 0.0)
     if hinge.side:
@@ -149,6 +151,33 @@ def _coordinate(pool: Pool, hinge: Hinge) -> int:
         for weight, each in zip(hinge.weights, hinge.inputs, strict=True)
     ]
     return reduce(partial(pool.add, "+"), parts)
+
+
+def _dampers(signals: Signals, inputs: Floats) -> Iterator[Hinge]:
+    """Hinges of declared derivatives, and of differences of two of one unit: at rest to one side, elsewhere to either.
+
+    A damper that holds back less one way than the other, and less once its valves have opened.
+    """
+    moving = [i for i, state in enumerate(signals.states) if state.derivative_of is not None]
+    pairs = [pair for pair in combinations(moving, 2) if len({signals.states[i].unit for i in pair}) == 1]
+    for speed in (*((i,) for i in moving), *pairs):
+        weight = 1.0 / signals.states[speed[0]].scale
+        kind = Hinge(speed, (weight, -weight)[: len(speed)], (), 1)
+        values = _values(kind, inputs)
+        if values.min() < 0.0 < values.max():
+            yield kind
+        for place in _places(np.abs(values), LIMITS // 2):
+            yield from (
+                replace(kind, side=side, place=side * place)
+                for side in (1, -1)
+                if place < (side * values).max()
+            )
+
+
+def _values(kind: Hinge, inputs: Floats) -> Floats:
+    """Values of z (rows,)."""
+    values: Floats = (inputs[:, list(kind.inputs)] * kind.weights).sum(axis=1)
+    return values
 
 
 def _keeps_away_from_zero(values: Floats) -> bool:
