@@ -13,7 +13,6 @@ from twinloop.planning.candidates import candidates
 from twinloop.planning.comparison import TRIED, Comparison, _spaced
 from twinloop.planning.gusts import Moved
 from twinloop.planning.proposal import Flown, Wanted
-from twinloop.planning.reach import bounds_of
 from twinloop.planning.seen import Seen
 
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
@@ -257,26 +256,15 @@ def test_until_a_prediction_has_come_true_no_flight_leads_far_beyond_what_was_se
     bounds = seen.around(reach, KNOWN)
     np.testing.assert_allclose(bounds[:, 1], np.array([-1.0, 1.0]) * (0.15 + reach * 0.3), atol=1e-12)
     comparison.options = replace(comparison.options, reach_seen=reach)
-    near = comparison._near_what_was_flown()
+    near = comparison._near_what_was_seen()
     inside = [
         all((run <= bounds[1]).all() and (run >= bounds[0]).all() for run in members) for members in runs
     ]
     assert near.tolist() == inside and 0 < near.sum() < len(near)
-    # Where every one leads further than that, it tells no flight from another.
-    comparison.flown = replace(FLOWN, seen=Seen(1e-6 * seen.flights, seen.task))
-    assert comparison._near_what_was_flown().all()
-
-
-def test_no_flight_leads_a_state_far_beyond_what_it_has_used_itself():
-    drawn = drafts()
-    comparison = compared(flown=replace(FLOWN, used=np.array([0.7, 0.1]), flies=False), drawn=drawn)
-    bounds = bounds_of(comparison.flown, "both", KNOWN, comparison.options)
-    still = np.zeros((1, STEPS + 1, 2))
-    inside = [
-        all((np.abs(flight(motor, genes, excitation, still[0])[0]) <= bounds[1]).all() for motor in MOTORS)
-        for genes, excitation in zip(drawn.genes, drawn.excitation, strict=True)
-    ]
-    assert comparison._near_what_was_flown().tolist() == inside and any(inside)
+    for anywhere in (replace(FLOWN, seen=None), replace(FLOWN, seen=Seen(1e-6 * seen.flights, seen.task))):
+        comparison.flown = anywhere
+        # Where every one leads further than that, it tells no flight from another.
+        assert comparison._near_what_was_seen().all()
 
 
 def test_what_has_hardly_moved_is_taken_to_have_moved_by_a_share_of_its_scale():

@@ -99,28 +99,6 @@ def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_nea
     assert TASK.initial_state[0] <= high[0]
 
 
-def test_a_state_that_has_used_little_of_its_envelope_goes_no_further_because_others_have():
-    flown = Flown(best=GENTLE, flies=True, usages=[0.4, 0.8], good=1.0, used=np.array([0.8, 0.2]))
-    for came_true, reaches in ((0, (0.9, 0.7)), (5, (0.9, 0.2 * 1.25**6))):
-        reached = replace(flown, came_true=came_true)
-        low, high = bounds_of(reached, "both", KNOWN, PLANNER.options)
-        np.testing.assert_allclose(high, np.array([0.9, 1.5]) * reaches)
-        np.testing.assert_allclose(low, -high)
-        assert reach_of(reached, "both", PLANNER.options) == 0.9
-    # Flights for the model may be far from any that flew: their limit is that of the first flight.
-    _, high = bounds_of(flown, "model", KNOWN, PLANNER.options)
-    np.testing.assert_allclose(high, np.array([0.9, 1.5]) * reach_of(flown, "model", PLANNER.options))
-
-
-def test_gains_are_within_reach_where_each_member_stays_within_the_bounds_of_the_next_flight():
-    genes = PLANNER.family.from_unit(Unit(2).part(1).stream("candidates").uniforms(200, 3))
-    flown = Flown(best=GENTLE, flies=True, usages=[0.8], good=1.0, used=np.array([0.8, 0.2]))
-    bounds = bounds_of(flown, "both", KNOWN, PLANNER.options)
-    _, usage = quality_and_usage(genes, bounds)
-    found = [PLANNER.within_reach(COMMITTEE, each, flown, "both") for each in genes]
-    assert found == (usage <= 1.0).tolist() and 20 < sum(found) < 200
-
-
 def test_on_a_twin_that_explains_no_flight_nothing_is_tuned_under_limits():
     quick, seen = (
         np.array([9.0, 0.0, 1.0]),

@@ -33,16 +33,6 @@ def usages_of(signals: Signals, states: Floats, only: State | None = None) -> Fl
     return _core.usages(signals.engine, envelope, states)
 
 
-def used_by_each(signals: Signals, states: Floats) -> Floats:
-    """The most that each state uses of its envelope in some readings (n_x,); 0 where it has none.
-
-    Args:
-        signals: of the system.
-        states: (n, n_x), at least one.
-    """
-    return np.array([float(usages_of(signals, states, state).max()) for state in signals.states])
-
-
 def outside(usages: Floats) -> NDArray[np.bool_]:
     """Where the envelope is left.
 

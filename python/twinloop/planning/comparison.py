@@ -16,7 +16,7 @@ from twinloop.planning.candidates import Candidates
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
 from twinloop.planning.proposal import Flown, Proposal, Wanted
-from twinloop.planning.reach import bounds_of, reach_of
+from twinloop.planning.reach import reach_of
 from twinloop.planning.reasons import Why, reason
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.worth import apart, gain, limit
@@ -71,7 +71,7 @@ class Comparison:
         )
         self.possible = self._possible()
         within = self.possible & (self.quiet.worst_usage <= reach)
-        self.keeps = within & self._bears_delay() & self._near_what_was_flown()
+        self.keeps = within & self._bears_delay() & self._near_what_was_seen()
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -157,11 +157,16 @@ class Comparison:
             bears[drafts.repeats :] |= self.flown.flies
         return bears if bears[: drafts.repeats].any() else np.ones_like(bears)
 
-    def _near_what_was_flown(self) -> Flags:
-        """Candidates that lead no member, in any state, far beyond the flights so far; all where every one does."""
-        drafts, signals = self.drafts, self.judge.signals
-        bounds = bounds_of(self.flown, self.wanted.goal, signals, self.options)
+    def _near_what_was_seen(self) -> Flags:
+        """Candidates that lead no member far beyond the states seen so far; all of them where every one does.
+
+        Until a prediction has come true a law is known where the flights were, and nobody knows how far beyond.
+        """
+        drafts, seen, reach = self.drafts, self.flown.seen, self.options.reach_seen
+        if seen is None or reach <= 0.0:
+            return np.ones_like(self.possible)
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
+        bounds = seen.around(reach, self.judge.signals)
         near = ~outside(self.judge.judge_within(bounds, self.members, genes, excitation, ends).worst_usage)
         near[drafts.repeats :] |= self.flown.flies
         return near if near[: drafts.repeats].any() else np.ones_like(near)

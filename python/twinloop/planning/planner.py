@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop import _core
-from twinloop._experiment.envelope import outside
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
@@ -219,19 +218,6 @@ class Planner(Judge):
         if last and not found.wanted.plain and proposal.genes.tobytes() != tuned.tobytes():
             return self._compared(committee, tuned, flown, replace(wanted, plain=True)).proposal()
         return proposal
-
-    def within_reach(self, committee: Committee, genes: Floats, flown: Flown, goal: str) -> bool:
-        """Whether a quiet flight of some gains (size,) leads no member further than the next flight may lead.
-
-        Args:
-            committee: that judges.
-            genes: gains.
-            flown: so far.
-            goal: "both", "model" or "control".
-        """
-        bounds, alone = bounds_of(flown, goal, self.signals, self.options), genes[np.newaxis]
-        members = self.stable_members(committee.members, alone)
-        return not outside(self.judge_within(bounds, members, alone).worst_usage).any()
 
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""

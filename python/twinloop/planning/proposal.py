@@ -39,8 +39,6 @@ class Flown:
         best: genes of the best flight; those tuned where no test was flown.
         flies: whether they are known to fly: to the end, and inside the envelope.
         usages: largest usage of the envelope in each flight.
-        used: largest usage of the envelope by each state alone, in all flights and where the task begins and leads
-            (n_x,); None: as much as by any.
         good: quality of the best flight that kept the envelope; infinite where none has: one that keeps it may then be
             worse.
         failed: genes of tests that failed on the system, or were cut.
@@ -60,7 +58,6 @@ class Flown:
     fared: Fared = Fared(1, 0)
     borne: int = 1
     seen: Seen | None = None
-    used: Floats | None = None
     came_true: int = 0
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from twinloop._ground.arrays import Floats
@@ -40,10 +38,8 @@ def bounds_of(flown: Flown, goal: str, signals: Signals, options: PlanningOption
         signals: of the system.
         options: of the planning.
     """
-    bounds = np.tile([[-np.inf], [np.inf]], len(signals.states))
-    for i, (state, reach) in enumerate(
-        zip(signals.states, _reaches(flown, goal, signals, options), strict=True)
-    ):
+    reach, bounds = reach_of(flown, goal, options), np.tile([[-np.inf], [np.inf]], len(signals.states))
+    for i, state in enumerate(signals.states):
         if state.envelope is not None:
             low, high = state.envelope
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -52,14 +48,3 @@ def bounds_of(flown: Flown, goal: str, signals: Signals, options: PlanningOption
         return bounds
     near = flown.seen.around(options.reach_seen, signals)
     return np.stack([np.maximum(bounds[0], near[0]), np.minimum(bounds[1], near[1])])
-
-
-def _reaches(flown: Flown, goal: str, signals: Signals, options: PlanningOptions) -> list[float]:
-    """The same as `reach_of` by each state alone (n_x).
-
-    A state that has used little of its envelope so far may be near a stall there of which no flight tells, however much
-    the others have used of theirs.
-    """
-    if flown.used is None or goal == "model":
-        return [reach_of(flown, goal, options)] * len(signals.states)
-    return [reach_of(replace(flown, usages=[used]), goal, options) for used in flown.used.tolist()]

@@ -38,11 +38,11 @@ class PlanningOptions:
             as a loss of quality. Not with the goal "control".
         draws: of sensor noise under which a flight is judged.
         margin: share of the envelope that a proposal keeps free on every member of the committee.
-        reach_first: usage of the envelope that each state may always have.
+        reach_first: usage of the envelope that a proposal may always have.
         reach_far: largest usage of flights for the model, whose gains may be far from any that were flown.
         reach_least: usage that such flights may always have, even if the first flight hardly moves.
-        reach_growth: largest ratio of a state's usage to its largest flown one, once more for each of the last
-            predictions in a row that came true; for flights for the model, of any state's to that of the first flight.
+        reach_growth: largest ratio of a proposal's usage to the largest flown one, once more for each of the last
+            predictions in a row that came true; for flights for the model, to that of the first flight.
         reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
             flights have moved them, until a prediction has come true; 0: anywhere.
         evaluations: number of flights on which gains are tuned at most, for each member and draw.

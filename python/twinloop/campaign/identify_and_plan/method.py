@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from twinloop import _core
-from twinloop._experiment.envelope import used_by_each
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
@@ -232,23 +231,13 @@ class IdentifyAndPlan:
             fared=Fared(0, 0) if best is None else standing.fared(book, best.genes, excited=True),
             borne=standing.borne(book),
             seen=None if came_true else self._seen(book),
-            used=self._used(book),
             came_true=came_true if committee.explains else 0,
         )
 
-    def _ends(self) -> Floats:
-        """Where the task begins and leads (n, n_x)."""
-        setup = self.setup
-        return np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
-
-    def _used(self, book: Logbook) -> Floats:
-        """The most of its envelope that each state has used in a flight that was inside, or uses in the task (n_x,)."""
-        flights = [run.trajectory.states for run in inside(book.experiments)]
-        return used_by_each(self.setup.signals, np.concatenate([self._ends(), *flights]))
-
     def _seen(self, book: Logbook) -> Seen:
         """Where the flights have been, and where the task leads."""
-        ends = self._ends()
+        setup = self.setup
+        ends = np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
         return Seen(
             standing.read_in(book, inside(book.experiments)), np.stack([ends.min(axis=0), ends.max(axis=0)])
         )
@@ -276,11 +265,9 @@ class IdentifyAndPlan:
         return answer
 
     def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
-        """Tuned gains, or those that the next flight may be flown with where tuned ones lead too far for it."""
+        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with."""
         flown = self._flown(book, standing.best_flown(book), tuned, committee)
-        if not committee.predicts_limits or self.planner.within_reach(
-            committee, tuned, flown, self.setup.goal
-        ):
+        if flown.seen is None or not committee.predicts_limits:
             return tuned
         goal, number = self.setup.goal, len(book.tests)
         found = self.planner.propose(committee, tuned, flown, goal, number, exploit=True, last=True)
