@@ -140,7 +140,7 @@ class Learner:
             answer = or_known_before(answer, earlier, told.answered)
         doubted = self._doubted(answer, told)
         if doubted and self.options.inside:
-            found = self._inside(book.experiments, told, earlier)
+            found = self._inside(book.experiments, earlier)
             if found is not None:
                 told, answer, begun = found
                 doubted = self._doubted(answer, told)
@@ -192,9 +192,9 @@ class Learner:
         )
 
     def _inside(
-        self, experiments: Sequence[Experiment], told: Told, earlier: Identified | None
+        self, experiments: Sequence[Experiment], earlier: Identified | None
     ) -> tuple[Told, Answer, UnderWay | None] | None:
-        """What is learnt of flights as far as they were inside their envelope, and the search for it.
+        """What is told, learnt and searched of flights as far as they were inside their envelope.
 
         None where none has left it for good, or where so little is left of them that more is lost than won.
         """
