@@ -154,15 +154,18 @@ def _coordinate(pool: Pool, hinge: Hinge) -> int:
 
 
 def _dampers(signals: Signals, inputs: Floats) -> Iterator[Hinge]:
-    """Hinges of declared derivatives, and of differences of two of one unit: at rest to one side, elsewhere to either.
+    """Hinges of differences of two declared derivatives of one unit: at rest to one side, elsewhere to either.
 
-    A damper that holds back less one way than the other, and less once its valves have opened.
+    A damper between two bodies holds back less one way than the other, and less once its valves have opened. Of a
+    single rate there are none: where a stop is touched on a few readings, they would stand in for it.
     """
-    moving = [i for i, state in enumerate(signals.states) if state.derivative_of is not None]
-    pairs = [pair for pair in combinations(moving, 2) if len({signals.states[i].unit for i in pair}) == 1]
-    for speed in (*((i,) for i in moving), *pairs):
-        weight = 1.0 / signals.states[speed[0]].scale
-        kind = Hinge(speed, (weight, -weight)[: len(speed)], (), 1)
+    states = signals.states
+    moving = [i for i, state in enumerate(states) if state.derivative_of is not None]
+    for i, j in combinations(moving, 2):
+        if states[i].unit != states[j].unit:
+            continue
+        weight = 1.0 / states[i].scale
+        kind = Hinge((i, j), (weight, -weight), (), 1)
         values = _values(kind, inputs)
         if values.min() < 0.0 < values.max():
             yield kind
