@@ -107,6 +107,15 @@ class Hypothesis(Recorded, kind="hypothesis"):
         return sum(len(found.weights) for found in self.sums)
 
     @property
+    def beside_few(self) -> bool:
+        """Whether its terms are of higher rungs or evolved, which may stand in for others, and few stand beside them.
+
+        The few are those of the sums from above.
+        """
+        terms = [term for found in self.sums for term in found.weights]
+        return bool(self.from_above) and self.pool.rung(terms) > 0
+
+    @property
     def length(self) -> float:
         """Description length of the sums."""
         return total(self.sums)

@@ -163,15 +163,13 @@ def test_hinges_of_rates_are_of_differences_at_rest_and_where_valves_open():
     stream = np.random.default_rng(0)
     rows = np.column_stack([stream.uniform(-1.0, 1.0, (200, 3)), stream.uniform(0.2, 1.0, (200, 2))])
     found = [hinge for hinge in hinges(CORNER, rows) if {2, 3} & set(hinge.inputs)]
-    speeds = {(2, 3): rows[:, 2] - rows[:, 3]}
+    apart = rows[:, 2] - rows[:, 3]
 
-    assert {hinge.inputs for hinge in found} == set(speeds) and all(not hinge.rates for hinge in found)
-    for inputs, values in speeds.items():
-        own = [hinge for hinge in found if hinge.inputs == inputs]
-        rest = [hinge for hinge in own if hinge.place == 0.0]
-        assert [hinge.side for hinge in rest] == ([1] if values.min() < 0.0 else [])
-        # Each is 0 for some of the readings, and grows for others.
-        assert all(0 < (hinge.side * (values - hinge.place) > 0.0).sum() < len(rows) for hinge in own)
+    assert {hinge.inputs for hinge in found} == {(2, 3)} and all(not hinge.rates for hinge in found)
+    assert [hinge.side for hinge in found if hinge.place == 0.0] == [1]
+    assert {hinge.side for hinge in found if hinge.place != 0.0} == {1, -1}
+    # Each is 0 for some of the readings, and grows for others.
+    assert all(0 < (hinge.side * (apart - hinge.place) > 0.0).sum() < len(rows) for hinge in found)
 
 
 def test_a_limited_power_is_found():

@@ -58,7 +58,7 @@ def said_inside(experiments: Sequence[Experiment], kept: Sequence[Experiment], d
     return [
         note(
             INSIDE,
-            f"Outside the envelope no law explains what was recorded together with what came before, so it is not"
+            "Outside the envelope no law explains what was recorded together with what came before, so it is not"
             f" learnt: {', '.join(cut)}. The twin knows nothing of what happens there, such as a fall or a stall.",
         )
     ]

@@ -34,14 +34,9 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     quiet = still(problem, (found.chain for found in hypothesis.sums))
     bases = [] if quiet and hypothesis.fit.stable else [hypothesis, *_without_lags(context, hypothesis)]
     # Terms of higher rungs and evolved ones may stand in for what begins at a place: it is looked for beside few terms.
-    terms = [term for found in hypothesis.sums for term in found.weights]
-    if (
-        not bases
-        and context.several
-        and context.signals.kinematics is None
-        and hypothesis.pool.rung(terms) > 0
-    ):
-        bases = [replace(hypothesis, sums=hypothesis.from_above)] if hypothesis.from_above else []
+    rigid = context.signals.kinematics is not None
+    if not bases and context.several and not rigid and hypothesis.beside_few:
+        bases = [replace(hypothesis, sums=hypothesis.from_above)]
     if not bases:
         return
     context.watch("terms")

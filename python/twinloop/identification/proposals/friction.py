@@ -45,13 +45,11 @@ def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if problem.priors.bounds or hypothesis.form == "absolute":
         return
     bases = [] if still(problem, (found.chain for found in hypothesis.sums)) else [hypothesis]
-    terms = [term for found in hypothesis.sums for term in found.weights]
     # Terms of higher rungs and evolved ones may stand in for friction: it is looked for beside few terms, too.
-    beside_few = bool(hypothesis.from_above) and hypothesis.pool.rung(terms) > 0
-    if not bases and not beside_few:
+    if not bases and not hypothesis.beside_few:
         return
     context.watch("terms")
-    if beside_few:
+    if hypothesis.beside_few:
         few = fitted(context, replace(hypothesis, sums=hypothesis.from_above, fit=None))
         bases += [few] if few.evidence.stable else []
     found = [other for other in (_with_friction(context, base) for base in bases) if _rubs(other)]

@@ -75,8 +75,9 @@ def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
     Returns:
         Of states that are no rates and do not wrap, and of commands of one sign, to either side; of differences of two
         states of one unit, and of commands of two signs, to both sides alike. Those of states and of differences also
-        times their rate. Of commands times a state that keeps away from 0, over that state: what a limited power takes
-        from them.
+        times their rate. Of differences of two declared derivatives of one unit, to one side at rest, and to either
+        elsewhere. Of commands times a state that keeps away from 0, over that state: what a limited power takes from
+        them.
     """
     kinds = list(_kinds(signals, [i for i in range(signals.n_x) if _keeps_away_from_zero(inputs[:, i])]))
     count = min(PLACES, MOST // (2 * max(1, len(kinds))))
@@ -123,8 +124,8 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
     if speed is not None:
         coordinate = pool.product(coordinate, speed)
     # At rest there is no place that could be tuned.
-    depth_above = pool.add("-", coordinate, hinge.place) if hinge.place else coordinate
-    above = pool.add("max", depth_above, 0.0)
+    beyond = pool.add("-", coordinate, hinge.place) if hinge.place else coordinate
+    above = pool.add("max", beyond, 0.0)
     place = hinge.place if hinge.side else -hinge.place
     below = pool.add("max", pool.add("-", pool.constant(place), coordinate), 0.0)
     if hinge.side:
