@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.times import shown_time
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.examination.log_check import LogCheck, check_log
 from twinloop.errors import InvalidInput
@@ -70,7 +71,7 @@ def _numbers(what: str, values: Floats, shape: tuple[int, ...]) -> Floats:
 
 def _period(seconds: float) -> str:
     """A period as people say it: with its rate where it is short."""
-    return f"{seconds:.4g} s" if seconds >= 1.0 else f"{1e3 * seconds:.4g} ms ({1.0 / seconds:.4g} Hz)"
+    return shown_time(seconds, 4) + ("" if seconds >= 1.0 else f" ({1.0 / seconds:.4g} Hz)")
 
 
 def _clock(found: LogCheck) -> str:

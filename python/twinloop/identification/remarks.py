@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.times import shown_time
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain
@@ -106,16 +107,12 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
     return [
         note(
             "sensor-offset",
-            f"Readings of {', '.join(names[offsets == offset])} come {_duration(abs(offset))}"
+            f"Readings of {', '.join(names[offsets == offset])} come {shown_time(abs(offset))}"
             f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is corrected"
             " for it.",
         )
         for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
     ]
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
 def other_noise(observer: Sequence[Chain], signals: Signals) -> list[Remark]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import enumerated
+from twinloop._ground.times import shown_time
 from twinloop.campaign.data.integrated import cuts, without_line
 from twinloop.campaign.data.turning import turning
 from twinloop.remarks import Remark, note
@@ -59,7 +60,7 @@ def late(states: Floats, signals: Signals) -> Iterator[Remark]:
         shift = lateness(moved.values, moved.readings, signals.dt, moved.derivative)
         if shift is None:
             continue
-        periods, ms = abs(shift) / signals.dt, 1e3 * abs(shift)
+        periods = abs(shift) / signals.dt
         several = len(moved.states) > 1
         cure = (
             "The preset default learns this (option offsets)."
@@ -70,7 +71,7 @@ def late(states: Floats, signals: Signals) -> Iterator[Remark]:
         yield note(
             "late",
             f"{enumerated(moved.states)} {'are' if several else 'is'} read about"
-            f" {f'{ms:.0f}' if ms > 10.0 else f'{ms:.2g}'} ms {'later' if shift > 0.0 else 'earlier'} than"
+            f" {shown_time(abs(shift), 2)} {'later' if shift > 0.0 else 'earlier'} than"
             f" {enumerated(moved.rates)}, which move{' them' if several else 's it'}. {cure}",
         )
 

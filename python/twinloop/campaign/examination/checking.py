@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from twinloop._experiment.envelope import is_bounded
+from twinloop._ground.times import shown_time
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.reaching import REACHED, Ending
@@ -146,8 +147,7 @@ def _delay(worst: LoopMargins, dt: float) -> Check:
     periods = worst.delay / dt
     borne = (
         f"The loop with the smallest delay margin, {worst.loop}, stays stable with up to"
-        f" {1e3 * worst.delay:.3g} ms more,"
-        f" {periods:.3g} periods"
+        f" {shown_time(worst.delay)} more, {periods:.3g} periods"
         if math.isfinite(periods)
         else "No delay makes any loop unstable"
     )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from twinloop._ground.times import time_unit
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.use import envelope_use
 from twinloop.faces.figures.units import words
@@ -43,6 +44,7 @@ def margins(found: Examination) -> Table | None:
     if loops is None:
         return None
     rows: list[list[object]] = []
+    factor, unit = time_unit(loop.delay for loop in (*loops.nominal, *loops.worst) if loop.stable)
     for nominal, worst in zip(loops.nominal, loops.worst, strict=True):
         for which, loop in (("worst", worst), ("twin", nominal)):
             if not loop.stable:
@@ -51,7 +53,7 @@ def margins(found: Examination) -> Table | None:
             rows.append(
                 [words(loop.loop), which, 20.0 * math.log10(loop.gain) if loop.gain > 0 else None,
                  20.0 * math.log10(loop.gain_down) if loop.gain_down > 0 else -math.inf, math.degrees(loop.phase),
-                 1e3 * loop.delay, loop.crossover, loop.sensitivity, loop.complementary, "yes"]
+                 factor * loop.delay, loop.crossover, loop.sensitivity, loop.complementary, "yes"]
             )  # fmt: skip
     head = [
         "loop",
@@ -59,7 +61,7 @@ def margins(found: Examination) -> Table | None:
         "gain (dB)",
         "down to (dB)",
         "phase (°)",
-        "delay (ms)",
+        f"delay ({unit})",
         "crossover (rad/s)",
         "Ms",
         "Mt",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from twinloop._ground.times import time_unit
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
 from twinloop.faces.figures.units import shown_unit, words
@@ -29,14 +30,15 @@ def states(result: Mapping[str, Any]) -> Table | None:
     if "states" not in twin:
         return None
     rows = []
+    per_second, late = time_unit(state["offset"] for state in twin["states"])
     for state in twin["states"]:
         (factor, unit), error, sensor = shown_unit(state["unit"]), state["error"], state["sensor"]
         rows.append([
             words(state["name"]), unit, None if error is None else factor * error, factor * sensor,
             error / sensor if sensor and error is not None else None,
-            1e3 * state["offset"],
+            per_second * state["offset"],
         ])  # fmt: skip
-    head = ["state", "unit", "error of whole flights", "sensor's noise", "ratio", "read late by (ms)"]
+    head = ["state", "unit", "error of whole flights", "sensor's noise", "ratio", f"read late by ({late})"]
     note = (
         "Errors are root mean squares of flown minus simulated; noise is a standard deviation, as estimated. A ratio"
         " of 1: only the sensors' noise is left."
