@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -50,6 +51,26 @@ def test_the_python_module_simulates_what_the_twin_does_in_another_process(which
     expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).true_states
     found = np.array(json.loads(done.stdout))[: len(expected)]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@ALL
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        ("taken.simulate({x}[1:], [{u}])", "simulate: initial_state: expected"),
+        ("taken.simulate({x}, [{u}, {u} + [0.0]])", "simulate: row 1 of commands: expected"),
+        ("taken.Twin().step({x} + [0.0], {u})", "step: x: expected"),
+        ("taken.Twin().step({x}, {u}[1:])", "step: u: expected"),
+    ],
+)
+def test_the_python_module_refuses_other_than_one_number_a_signal(which, call, said):
+    twin = TWINS[which]()
+    taken = types.SimpleNamespace()
+    exec(compile(str(twin.export("python")), "taken", "exec"), taken.__dict__)
+    flight = flown(twin, seed=7)
+    x, u = repr(flight.states[0].tolist()), repr(flight.commands[0].tolist())
+    with pytest.raises(ValueError, match=re.escape(said)):
+        eval(call.format(x=x, u=u), {"taken": taken})
 
 
 @ALL
@@ -386,6 +407,19 @@ def test_a_controller_in_python_commands_the_same(which, seed):
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
     bounds = np.array([command.bounds for command in THREE.commands])
     assert (expected == bounds[:, 0]).any() or (expected == bounds[:, 1]).any()
+
+
+@pytest.mark.parametrize("given", [("state", 2, 3), ("target", 3, 4)])
+def test_a_controller_in_python_refuses_other_than_one_number_a_state(given):
+    what, states, targets = given
+    described = CONTROLLERS["state feedback"]
+    family = described.bind(THREE)
+    taken: dict = {}
+    exec(compile(controller_python(described, family, np.zeros(family.size)), "taken", "exec"), taken)
+    with pytest.raises(
+        ValueError, match=rf"command: {what}: expected 3 numbers \(angle, rate, level\), found"
+    ):
+        taken["Controller"]().command([0.0] * states, [0.0] * targets)
 
 
 @needs_cc

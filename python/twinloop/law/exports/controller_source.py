@@ -240,6 +240,10 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
         f"        self._memory = [0.0] * {memory}", "",
         "    def command(self, state, target):",
         '        """What to send for the coming period, for a measured state and a target."""',
+        "        for what, given in (('state', state), ('target', target)):",
+        "            if len(given) != len(STATES):",
+        "                expected = f\"{len(STATES)} numbers ({', '.join(STATES)})\"",
+        "                raise ValueError(f\"command: {what}: expected {expected}, found {len(given)}\")",
         f"        memory, command = self._memory, [0.0] * {signals.n_u}",
         *body, "        return command", "",
     ])  # fmt: skip

@@ -28,6 +28,15 @@ PYTHON = Dialect(
 )
 
 _HELPERS = '''
+def _one_each(what, names, values):
+    """The values as a list: one for each of the named signals, or an error."""
+    values = list(values)
+    if len(values) != len(names):
+        expected = ", ".join(name for name, _ in names)
+        raise ValueError(f"{what}: expected {len(names)} numbers ({expected}), found {len(values)}")
+    return values
+
+
 def _divided(a, b):
     """Protected: a where b is all but 0."""
     return a / b if abs(b) > 1e-6 else a
@@ -90,6 +99,7 @@ class Twin:
 
     def step(self, x, u):
         """The state a period after the state x, under the commands u."""
+        x, u = _one_each("step: x", STATES, x), _one_each("step: u", COMMANDS, u)
         starts, middles, ends = self._effects(u)
         return _step(x, starts, middles, ends)
 
@@ -135,6 +145,7 @@ class Twin:
 
     def step(self, x, u):
         """The state a period after the state x, under the commands u."""
+        x, u = _one_each("step: x", STATES, x), _one_each("step: u", COMMANDS, u)
         seen = [value * (1.0 / scale) for value, scale in zip(u, SCALES)]
         return _step(x, seen, seen, seen)
 '''
@@ -142,8 +153,9 @@ class Twin:
 _SIMULATE = '''
 def simulate(initial_state, commands):
     """The states of a free run, the first one among them; what lies beyond a bound of a command is clipped."""
-    twin, states = Twin(), [list(initial_state)]
-    for u in commands:
+    twin, states = Twin(), [_one_each("simulate: initial_state", STATES, initial_state)]
+    for k, row in enumerate(commands):
+        u = _one_each(f"simulate: row {k} of commands", COMMANDS, row)
         clipped = [min(max(value, low), high) for value, (low, high) in zip(u, BOUNDS)]
         states.append(twin.step(states[-1], clipped))
     return states
