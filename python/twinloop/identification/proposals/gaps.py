@@ -35,6 +35,8 @@ DAMPED = (1.0, 0.3)
 """Shares of the damping of what was walked to from which it is tuned."""
 FADED = (1.0, 2.5)
 """Shares of the time in which it fades from which it is tuned, each with each."""
+HOPELESS = 500.0
+"""What the best law with a mass may be longer by, in units of χ², before the others are tuned from beside them."""
 FAR = 200.0
 """What a law with a mass may be longer by, in units of χ², before it is tuned again from beside it."""
 ROUNDS = 6
@@ -66,8 +68,11 @@ def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         screen, short = Screen.of(context, variant), _short(variant)
         looked = screen if short is variant else Screen.of(context, short)
         for place in rates:
-            pairs = [near for mass in _masses(looked, place) for near in _near(mass)]
-            several = [fitted(context, one) for pair in pairs for one in _described(screen, pair, place)]
+            several: list[Hypothesis] = []
+            for pairs in _nearest(_masses(looked, place)):
+                several += [fitted(context, one) for pair in pairs for one in _described(screen, pair, place)]
+                if not any(one.evidence.length < hypothesis.evidence.length + HOPELESS for one in several):
+                    break
             if not several:
                 continue
             told = max(several, key=by_evidence)
@@ -185,11 +190,11 @@ def _with_sum(hypothesis: Hypothesis, place: int, other: Sum) -> Hypothesis:
     return replace(hypothesis, sums=sums, fit=None)
 
 
-def _near(one: HiddenState) -> Iterator[Sources]:
-    """A mass, and others from which tuning may go elsewhere: readings between which little is known bias these two."""
+def _nearest(masses: Sequence[HiddenState]) -> Iterator[list[Sources]]:
+    """Masses, then others from which tuning may go elsewhere: readings between which little is known bias these two."""
     for damping, time in itertools.product(DAMPED, FADED):
-        other = one._replace(damping=one.damping * damping, time=one.time * time)
-        yield other, other
+        others = [one._replace(damping=one.damping * damping, time=one.time * time) for one in masses]
+        yield [(other, other) for other in others]
 
 
 def _described(screen: Screen, pair: Sources, place: int) -> Iterator[Hypothesis]:
