@@ -35,12 +35,12 @@ DAMPED = (1.0, 0.3)
 """Shares of the damping of what was walked to from which it is tuned."""
 FADED = (1.0, 2.5)
 """Shares of the time in which it fades from which it is tuned, each with each."""
-HOPELESS = 500.0
-"""What the best law with a mass may be longer by, in units of χ², before the others are tuned from beside them."""
 FAR = 200.0
-"""What a law with a mass may be longer by, in units of χ², before it is tuned again from beside it."""
+"""What the best law with a mass may be longer by, in units of χ², before masses are tuned from beside them."""
 ROUNDS = 6
 """Times at most that it is."""
+GAIN = 3.0
+"""What each of these times must gain, in units of χ²: one that does not is the last, or two in a row once it pays."""
 BESIDE = (("turns", 0.08), ("gap", 0.06), ("damping", 0.2), ("time", 0.1))
 """Shares by which its numbers are larger or smaller then."""
 QUIET = 0.3
@@ -71,13 +71,15 @@ def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
             several: list[Hypothesis] = []
             for pairs in _nearest(_masses(looked, place)):
                 several += [fitted(context, one) for pair in pairs for one in _described(screen, pair, place)]
-                if not any(one.evidence.length < hypothesis.evidence.length + HOPELESS for one in several):
+                if not any(one.evidence.length < hypothesis.evidence.length + FAR for one in several):
                     break
             if not several:
                 continue
             told = max(several, key=by_evidence)
             if told.evidence.length < hypothesis.evidence.length + FAR:
-                told = _polished(context, _with_more(context, _polished(context, told), place))
+                told = _polished(context, told, hypothesis)
+            if told.evidence > hypothesis.evidence and (more := _with_more(context, told, place)) is not told:
+                told = _polished(context, more, hypothesis)
             yield told
             if told.evidence > hypothesis.evidence:
                 yield from (fitted(context, closed) for closed in _closed(context, told, place))
@@ -94,8 +96,11 @@ def _short(hypothesis: Hypothesis) -> Hypothesis:
     return hypothesis if left >= 0 else replace(hypothesis, runs=tuple(runs))
 
 
-def _polished(context: Context, told: Hypothesis) -> Hypothesis:
-    """The best hypothesis tuned to from beside one: where a mass just touches, what is left has many valleys."""
+def _polished(context: Context, told: Hypothesis, known: Hypothesis) -> Hypothesis:
+    """The best hypothesis tuned to from beside one: where a mass just touches, what is left has many valleys.
+
+    One that is no likelier than what is known without a mass is hardly another valley's neighbour: it gets one chance.
+    """
     failed, dt = 0, context.signals.dt
     for number in range(ROUNDS):
         if all(one.chain.motion.white * dt <= QUIET * float(one.chain.sensors[0]) for one in told.sums):
@@ -106,10 +111,10 @@ def _polished(context: Context, told: Hypothesis) -> Hypothesis:
             corner for corner in itertools.product((False, True), repeat=4) if sum(corner) % 2 == number % 2
         ]
         best = max([told, *(fitted(context, _beside(begun, corner)) for corner in corners)], key=by_evidence)
-        failed = failed + 1 if best is told else 0
-        if failed == 2:
-            break
+        failed = 0 if best.evidence.less(GAIN) > told.evidence else failed + 1
         told = best
+        if failed == (2 if told.evidence > known.evidence else 1):
+            break
     return told
 
 
