@@ -55,3 +55,14 @@ def test_other_units_are_no_angles():
     )
     assert angles(signals) == set()
     assert rungs(Pool(3), signals, LIBRARIES, 450)
+
+
+@pytest.mark.parametrize(
+    ("unit", "moves"), [("m/s", True), ("deg/s", True), ("L/min", True), ("rpm", True), ("m", False), ("K", False)]
+)
+def test_what_is_per_time_is_likelier_slowed_both_ways_than_driven_on_by_its_square(unit, moves):
+    signals = tl.Signals([tl.State("x", unit, 1.0)], [tl.Command("u", "V", (0.0, 1.0))], 0.1)
+    pool = Pool(2)
+    rungs(pool, signals, ("quadratic", "damping"), 450)
+    square, slowed = pool.product(0, 0), pool.product(pool.add("abs", 0), 0)
+    assert (pool.length(square) > pool.length(slowed)) is moves

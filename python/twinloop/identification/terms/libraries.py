@@ -14,6 +14,8 @@ FRICTION = 30.0
 """Steepness of dry friction at rest, in units of a speed's scale."""
 LIKELIER = 1.0
 """Nats by which |x| x of a rate or a command is shorter than its square."""
+PER_TIME = ("/s", "/min", "/h", "rpm")
+"""Ends of units of what moves or flows."""
 DEGREES = ("deg", "°", "degree", "degrees")
 """Units of angles of which a turn is 360."""
 CUBIC_INPUTS = 13
@@ -36,14 +38,15 @@ def quadratic(pool: Pool, signals: Signals) -> Terms:
 def damping(pool: Pool, signals: Signals) -> Terms:
     """|x| x of inputs with two signs that are no angles: what slows a motion both ways, as its square does not.
 
-    Where a rate had one sign only the readings do not tell drag from its square, which would drive the machine on as
+    Where a speed had one sign only the readings do not tell drag from its square, which would drive the machine on as
     soon as it turns; where a command had, they do not tell a thruster that can turn round from one that cannot. So
     |x| x is taken to be the likelier of the two. Neither is as likely as the input itself, which a command that is only
     switched over does not tell from |x| x.
     """
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
-    likelier = rates(signals) | set(range(signals.n_x, pool.inputs))
+    moving = {i for i, state in enumerate(signals.states) if state.unit.endswith(PER_TIME)}
+    likelier = rates(signals) | moving | set(range(signals.n_x, pool.inputs))
     terms: Terms = []
     for i in signed:
         terms.append(pool.product(pool.add("abs", i), i))
