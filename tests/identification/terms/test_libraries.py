@@ -58,7 +58,8 @@ def test_other_units_are_no_angles():
 
 
 @pytest.mark.parametrize(
-    ("unit", "moves"), [("m/s", True), ("deg/s", True), ("L/min", True), ("rpm", True), ("m", False), ("K", False)]
+    ("unit", "moves"),
+    [("m/s", True), ("deg/s", True), ("L/min", True), ("rpm", True), ("m", False), ("K", False)],
 )
 def test_what_is_per_time_is_likelier_slowed_both_ways_than_driven_on_by_its_square(unit, moves):
     signals = tl.Signals([tl.State("x", unit, 1.0)], [tl.Command("u", "V", (0.0, 1.0))], 0.1)
