@@ -210,11 +210,11 @@ def test_rotors_that_are_not_equal_are_told_apart(gains):
 
 def test_what_a_mixer_says_shows_in_readings_that_single_commands_leave_open():
     weak = np.array(GYRO) / 60.0
-    flights = flown(weak, runs=1, noise=0.01)
+    flights = flown(weak, runs=1, noise=0.016, seed=9)
     axes = of_mixer(np.sign([*weak, 0.0])[:, None], flights[0])
     alone, told = learnt(flights), learnt(flights, axes)
     assert together(told.pool, axes[0], squared=True) in told.sums[0].weights
-    assert not np.allclose(slopes(alone, weak), weak, rtol=0.3)
+    assert not slopes(alone, weak).any()
     assert told.description_length < alone.description_length - 10.0
     np.testing.assert_allclose(slopes(told, weak), weak, rtol=0.1)
 

@@ -13,7 +13,7 @@ Terms = list[int]
 FRICTION = 30.0
 """Steepness of dry friction at rest, in units of a speed's scale."""
 LIKELIER = 1.0
-"""Nats by which |x| x of a rate or a command is shorter than its square."""
+"""Nats by which |x| x of a speed or a command is shorter than its square."""
 PER_TIME = ("/s", "/min", "/h", "rpm")
 """Ends of units of what moves or flows."""
 DEGREES = ("deg", "°", "degree", "degrees")
