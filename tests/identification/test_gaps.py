@@ -51,13 +51,15 @@ def test_masses_are_pressed_and_move_as_their_equations_say():
 
 
 def test_each_run_begins_anew_and_masses_do_not_know_each_other():
-    rates, half = tuple(driven(t) for t in at_stages()), STEPS // 2
-    runs = [slice(0, half), slice(half, half), slice(half, STEPS)]
+    rates, third = tuple(driven(t) for t in at_stages()), STEPS // 3
+    runs = [slice(0, third), slice(third, third), slice(third, STEPS)]
     both = behind_gaps(MASSES, rates, runs, DT)
     for k in range(2):
         alone = Masses(*(numbers[[k]] for numbers in MASSES))
         for rows in (runs[0], runs[2]):
-            own = behind_gaps(alone, tuple(each[rows] for each in rates), [slice(0, half)], DT)
+            own = behind_gaps(
+                alone, tuple(each[rows] for each in rates), [slice(0, rows.stop - rows.start)], DT
+            )
             for stage, other in zip(both, own, strict=True):
                 np.testing.assert_array_equal(stage[rows, :, k], other[:, :, 0])
 

@@ -64,14 +64,17 @@ def masses_behind(
     if not found.min() < min(PROMISING * trial.bare, trial.bare - worth):
         return []
     least, count = groups[0][0].min(), len(found)
-    for stride, _ in itertools.product(STRIDES, range(STEPS)):
-        around = _around(best, stride)
-        around[0] = np.maximum(around[0], least)
-        left = trial.left(around).reshape(-1, count)
-        better, each = left.argmin(axis=0), np.arange(count)
-        lower = left[better, each] < found
-        best = np.where(lower, around.reshape(len(best), -1, count)[:, better, each], best)
-        found = np.where(lower, left[better, each], found)
+    for stride in STRIDES:
+        for _ in range(STEPS):
+            around = _around(best, stride)
+            around[0] = np.maximum(around[0], least)
+            left = trial.left(around).reshape(-1, count)
+            better, each = left.argmin(axis=0), np.arange(count)
+            lower = left[better, each] < found
+            if not lower.any():
+                break
+            best = np.where(lower, around.reshape(len(best), -1, count)[:, better, each], best)
+            found = np.where(lower, left[better, each], found)
     return _apart(best, found) if found.min() < WALKED * trial.bare else []
 
 
