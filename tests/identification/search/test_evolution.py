@@ -89,6 +89,24 @@ def test_new_nodes_use_the_operators_that_are_allowed(seed):
     assert any("Min(" in text for text in texts)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_new_quotient_is_infinite_in_the_room_of_its_inputs(seed):
+    pool, stream, within = Pool(3), Unit(seed, (0,)).stream("terms"), ((0.0, 1.2), (-4.0, 4.0), (-1.0, 1.0))
+    parents = [0, 1, 2, pool.one]
+    for _ in range(600):
+        node = _drawn(pool, parents, ("+", "-", "/", "abs", "cos"), stream, SIGNALS, within)
+        if node is not None and pool.length(node) < 20.0:
+            parents.append(node)
+    below = {pool[node].operands[1] for node in pool.needed(parents) if pool[node].operation == "/"}
+    # The corners, and anywhere between them; a state may come near 0, a command may be 0.
+    rows = np.random.default_rng(seed).uniform(*np.array(within).T, (2000, 3))
+    corners = np.array(np.meshgrid((2e-3, 1.2), (-4.0, 0.0, 4.0), (-1.0, 0.0, 1.0))).reshape(3, -1).T
+    values = pool.values(sorted(below), np.vstack([rows, corners]))
+    assert len(below) > 5 and ((values > 0.0).all(axis=0) | (values < 0.0).all(axis=0)).all()
+    without = {_drawn(Pool(3), [0, 1, 2], ("/",), stream, SIGNALS) for _ in range(50)}
+    assert without - {None}
+
+
 class Found:
     def __init__(self, **weights):
         self.weights = {int(node[1:]): weight for node, weight in weights.items()}

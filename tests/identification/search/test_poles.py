@@ -8,7 +8,7 @@ from problems import problem_of
 from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.search.poles import room, vanishes_nowhere
+from twinloop.identification.search.poles import divides, room, vanishes_nowhere
 from twinloop.identification.search.quotients import with_quotients
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.search.walks import Walks
@@ -35,7 +35,30 @@ def test_a_law_is_to_hold_in_the_envelope_and_where_the_runs_were():
     )
     seen = np.linspace(-1.0, 1.0, 50)[:, np.newaxis]
     states = seen * [1.0, 1.0, 0.0, 0.0, 1.0, 1.0] + [0.0, 0.0, 0.3, -0.3, 0.0, 0.0]
-    assert room(signals, states) == ((-2, 2), (-1, 1), (0, 2), (-2, 0), (-1, 1), (-180, 180))
+    assert room(signals, states) == ((-2, 2), (-1, 1), (0, 2), (-2, 0), (-1, 1), (-180, 180), (0, 1))
+
+
+def test_a_command_may_be_all_that_it_is_allowed_to_be_in_units_of_its_scale():
+    commands = [
+        tl.Command("duty", "1", (0.0, 0.5)),
+        tl.Command("torque", "N m", (-2.0, 4.0), scale=2.0),
+    ]
+    signals = tl.Signals([tl.State("x", "1", 1.0, envelope=(-1.0, 1.0))], commands, 0.1)
+    assert room(signals, np.zeros((9, 1)))[1:] == ((0, 1), (-1, 2))
+
+
+def test_what_may_be_0_is_nothing_to_divide_by():
+    # A level that is never below 0, a place on either side of it; commands that may be 0 and one that may not.
+    pool, bounds = Pool(5), ((0.0, 3.0), (-1.0, 2.0), (0.0, 1.0), (-1.0, 1.0), (0.1, 1.0))
+    above_two = pool.add("-", 1, 2.1)
+    sum_ = pool.add("+", 0, pool.add("abs", 1))
+    allowed = [0, 4, pool.product(0, 0), pool.product(0, 4), above_two, sum_, pool.add("cos", 2)]
+    refused = [1, 2, 3, pool.product(0, 2), pool.product(1, 1), pool.add("sqrt", 2), pool.add("-", 0, 4)]
+    assert [divides(pool, node, 2, bounds) for node in allowed] == [True] * len(allowed)
+    assert [divides(pool, node, 2, bounds) for node in refused] == [False] * len(refused)
+    # What is hidden begins at 0; where nothing is known of the room, nothing is refused.
+    assert not divides(pool, pool.hidden(0), 2, bounds)
+    assert all(divides(pool, node, 2, ()) for node in (*refused, pool.hidden(0)))
 
 
 @pytest.mark.parametrize(("highest", "clear"), [(3.0, True), (3.4, False)])

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from twinloop import _core
 from twinloop._ground.elementary import log
+from twinloop.identification.search.poles import divides
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.search.walks import Walks
@@ -18,7 +19,7 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.sizes import in_shares, size
 from twinloop.law.expressions import UNARY
-from twinloop.signals import Signals
+from twinloop.signals import Bounds, Signals
 
 PRODUCTS = 0.5
 """Share of new nodes that are products: most laws of machines are made of them."""
@@ -56,7 +57,7 @@ def evolve(
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
     taken: set[int] = set()
     for generation in range(options.generations):
-        candidates = _grown(pool, list(survivors), options, draw, signals)
+        candidates = _grown(pool, list(survivors), options, draw, signals, problem.room)
         wholes = [_whole(pool, found, taken) for found in best]
         # A chain may use what drives another one; its own sum would be a law that nobody has paid for, and so would
         # sums that use each other.
@@ -80,13 +81,14 @@ def _grown(
     options: IdentificationOptions,
     draw: _core.Stream,
     signals: Signals,
+    room: Sequence[Bounds],
 ) -> list[int]:
     """Parents and new nodes, as many as are judged at once, or as can be drawn."""
     candidates = dict.fromkeys(parents)
     tries = 0
     while len(candidates) < options.population and tries < 20 * options.population:
         tries += 1
-        node = _drawn(pool, parents, options.operators, draw, signals)
+        node = _drawn(pool, parents, options.operators, draw, signals, room)
         if node is not None and pool.length(node) <= options.longest:
             candidates.setdefault(node)
     return list(candidates)
@@ -106,9 +108,14 @@ def _surviving(pool: Pool, survivors: Mapping[int, int], best: Sequence[Sum], un
 
 
 def _drawn(
-    pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _core.Stream, signals: Signals
+    pool: Pool,
+    parents: Sequence[int],
+    operators: Sequence[str],
+    draw: _core.Stream,
+    signals: Signals,
+    room: Sequence[Bounds] = (),
 ) -> int | None:
-    """A new node of inputs and parents; None where it makes no sense.
+    """A new node of inputs and parents; None where it makes no sense, as a quotient does that is infinite in the room.
 
     Products and sizes are what they are in any unit. For all else, and for constants, parents are in units of their
     sizes, two inputs of one unit in those of the first.
@@ -136,6 +143,8 @@ def _drawn(
     if operation == "*":
         return pool.add(operation, a, b)
     if operation == "/":
+        if not divides(pool, b, signals.n_x, room):
+            return None
         return pool.add(operation, a, in_shares(pool, b, signals))
     if max(a, b) < signals.n_x and signals.states[a].unit == signals.states[b].unit:
         scale = size(pool, a, signals)

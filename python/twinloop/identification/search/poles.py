@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.terms.denominators import Denominator
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.expressions import CONSTANT, SHARE
 from twinloop.signals import Bounds, Signals
 
 POINTS = 400
-"""At which a denominator is looked at, about; never fewer than the two ends of each state."""
+"""At which a denominator is looked at, about; never fewer than the two ends of each input."""
 CROSSES = 0.05
 """Share of its readings that a state has beyond 0 at least if it changes its sign, rather than its noise."""
+OFF = 1e-3
+"""Share of its room that a state is away from 0 at least where its room ends there."""
+
+FACTORS = ("*", "/", "abs", "sqrt", SHARE)
+"""Operations that give 0 where an operand is 0, or is divided by nearly nothing, and nowhere else."""
 
 
 def room(signals: Signals, states: Floats) -> tuple[Bounds, ...]:
-    """Within which bounds a law is to hold: the envelope, a whole turn, or where the runs were, if that is wider.
+    """Within which bounds of its inputs a law is to hold.
 
-    A state that never changed its sign, such as a concentration, is not taken to: envelopes often leave it some space
-    beyond 0, where its law has poles that nothing meets.
+    Of a state that is the envelope, a whole turn, or where the runs were, if that is wider. A state that never changed
+    its sign, such as a concentration, is not taken to: envelopes often leave it some space beyond 0, where its law has
+    poles that nothing meets. A command may be all that it is allowed to be, in units of its scale.
 
     Args:
         signals: of the system.
@@ -38,28 +44,60 @@ def room(signals: Signals, states: Floats) -> tuple[Bounds, ...]:
         elif state.period is not None:
             low, high = min(low, -0.5 * state.period), max(high, 0.5 * state.period)
         bounds.append((low, high))
-    return tuple(bounds)
+    return (*bounds, *((u.bounds[0] / u.size, u.bounds[1] / u.size) for u in signals.commands))
+
+
+def divides(pool: Pool, node: int, states: int, room: Sequence[Bounds]) -> bool:
+    """Whether a node keeps its sign over the room of its inputs, so that one may divide by it.
+
+    A command that may be 0 does not, a state whose room only ends there does. Of a hidden state, which begins at 0,
+    nothing keeps its sign.
+
+    Args:
+        pool: with the node.
+        node: an expression.
+        states: how many inputs are states, the first.
+        room: bounds of each input; empty: nothing is known of it.
+    """
+    if not room or pool.is_hidden(node):
+        return not room
+    operation, operands, value = pool[node]
+    if operation == CONSTANT:
+        return value != 0.0
+    # What touches 0 and turns back, as a size does, shows in what it is made of.
+    if operation in FACTORS:
+        return all(divides(pool, operand, states, room) for operand in operands)
+    inside = [_off_zero(bounds) if i < states else bounds for i, bounds in enumerate(room)]
+    values = _on_grid(pool, [node], inside)
+    return bool(values.min() > 0.0 or values.max() < 0.0)
+
+
+def _off_zero(bounds: Bounds) -> Bounds:
+    """Bounds that end near 0 where they did at 0."""
+    low, high = bounds
+    return (OFF * high if low == 0.0 else low), (OFF * low if high == 0.0 else high)
 
 
 def vanishes_nowhere(pool: Pool, denominator: Denominator, room: Sequence[Bounds]) -> bool:
-    """Whether a denominator stays above 0 on a grid over the room of its states.
+    """Whether a denominator stays above 0 on a grid over the room of its inputs.
 
     Args:
         pool: with its nodes.
         denominator: of states.
-        room: bounds of each state; empty: nothing is known of it.
+        room: bounds of each input; empty: nothing is known of it.
     """
     nodes, weights = [node for node, _ in denominator], np.array([weight for _, weight in denominator])
     return not room or bool((1.0 + (_on_grid(pool, nodes, room) * weights).sum(axis=1)).min() > 0.0)
 
 
 def _on_grid(pool: Pool, nodes: Sequence[int], room: Sequence[Bounds]) -> Floats:
-    """Values of nodes of states on a grid over their room (points, nodes)."""
+    """Values of nodes on a grid over the room of their inputs (points, nodes)."""
     used = sorted({leaf for node in nodes for leaf in pool.leaves(node) if leaf is not None})
     ends = 2
     while used and (ends + 1) ** len(used) <= POINTS:
         ends += 1
-    grid = np.array(list(product(*(np.linspace(*room[i], ends) for i in used))))
-    rows = np.zeros((len(grid), pool.inputs))
-    rows[:, used] = grid
+    axes = np.meshgrid(*(np.linspace(*room[i], ends) for i in used), indexing="ij")
+    rows = np.zeros((ends ** len(used), pool.inputs))
+    for i, axis in zip(used, axes, strict=True):
+        rows[:, i] = axis.ravel()
     return pool.values(nodes, rows)

@@ -46,7 +46,7 @@ class Problem:
         self.priors = hypothesis.candidates.priors
         self.as_integrated = context.as_integrated
         self.room = room(signals, self.stages.start[:, : signals.n_x])
-        """Bounds of each state within which a denominator must not vanish."""
+        """Bounds of each input within which a denominator must not vanish."""
         self._values: dict[int, Floats] = dict(bare._values) if bare else {}
         self._varied: dict[int, float] = dict(bare._varied) if bare else {}
         self._feedthrough: dict[tuple[int, int], Floats] = dict(bare._feedthrough) if bare else {}
