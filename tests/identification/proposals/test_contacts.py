@@ -1,6 +1,7 @@
 """What begins at a place: the force of a stop, the torque behind a gear's play, a valve that opens late."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,18 @@ from twinloop.identification.search.drives import drive
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.starts import starts
-from twinloop.identification.terms.hinges import LIMITS, entered, hinges, limits
+from twinloop.identification.terms.hinges import (
+    DAMPINGS,
+    LIMITS,
+    Hinge,
+    begun,
+    damped,
+    entered,
+    hinges,
+    limits,
+)
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.play import FIRM
 
 WORKERS = _core.Workers(2)
 DT = 0.02
@@ -75,7 +86,9 @@ def pushed(amplitude, seed, steps=150, held=10):
 
 
 def places(twin):
-    return [float(text) for text in re.findall(r"Max\([^,]*? [-+] ([0-9.]+), 0\)", twin.equations(4))]
+    law = twin.equations(4)
+    damped = [float(text) / FIRM for text in re.findall(r"Max\(Min\([^,]*? [-+] ([0-9.]+), ", law)]
+    return [*damped, *(float(text) for text in re.findall(r"Max\([^,]*? [-+] ([0-9.]+), 0\)", law))]
 
 
 def free_run_error(twin, derivative, start, commands, signals):
@@ -103,6 +116,28 @@ def test_a_stop_is_found_where_it_is():
     error = free_run_error(twin, on_the_rail, (0.0, 0.0), unseen, RAIL)
     assert error < 0.01
     assert error < 0.1 * free_run_error(without, on_the_rail, (0.0, 0.0), unseen, RAIL)
+
+
+def test_a_stop_of_rubber_is_a_spring_and_a_damper_that_never_pull():
+    damping = 18.0
+
+    def on_rubber(x, u):
+        push = max(0.0, STIFFNESS * (x[0] - STOP) + damping * x[1]) if x[0] > STOP else 0.0
+        return np.array([x[1], u - 0.8 * x[1] - push])
+
+    runs = [
+        flown(on_rubber, (0.0, 0.0), pushed(6.0, seed) + 1.5, RAIL, [1e-3, 1e-2], seed) for seed in (1, 2)
+    ]
+    twin = tl.identify(runs, RAIL, seed=0)
+
+    law = twin.equations(4)
+    (stiffness,) = re.findall(r"- ([0-9.]+)\*Max\(Min\(", law)
+    ((held, place),) = re.findall(r"\+ ([0-9.]+)\*velocity.*\n *- ([0-9.]+)\n", law)
+    assert float(place) == pytest.approx(STOP, abs=0.002)
+    assert float(stiffness) == pytest.approx(STIFFNESS, rel=0.1)
+    assert float(held) == pytest.approx(damping / STIFFNESS, rel=0.15)
+    assert "hidden" not in law
+    assert free_run_error(twin, on_rubber, (0.0, 0.0), pushed(6.0, 3) + 1.5, RAIL) < 0.02
 
 
 def test_play_is_found_between_two_states():
@@ -332,6 +367,64 @@ def test_a_hinge_is_nothing_on_one_side_and_grows_on_the_other():
     (of_force, *_) = [term for term in terms if set(pool.leaves(term)) <= {2, None}]
     mirrored = inputs * [1.0, 1.0, -1.0]
     np.testing.assert_array_equal(pool.values([of_force], mirrored), -pool.values([of_force], inputs))
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**9])
+@pytest.mark.parametrize("side", [1, -1, 0])
+def test_a_damped_hinge_is_what_a_spring_and_a_damper_push_with(side, scale):
+    signals = tl.Signals(
+        [
+            tl.State("position", "m", 2.0 * scale),
+            tl.State("velocity", "m/s", 3.0 * scale, derivative_of="position"),
+        ],
+        RAIL.commands,
+        DT,
+    )
+    inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (500, 3))
+    place = -0.2 if side < 0 else 0.2
+    bare = Hinge((0,), (0.5 / scale,), (), side, place)
+    # With its rate or without, it is the same place.
+    several = damped([bare, replace(bare, rates=(1,))], signals)
+    assert [one.damping for one in several] == [share * DT for share in DAMPINGS]
+    pool = Pool(3)
+    terms = [entered(pool, one, 100) for one in several]
+    values = pool.values(terms, inputs * [scale, scale, 1.0])
+    for one, column in zip(several, values.T, strict=True):
+        expected = []
+        for x, v in 0.5 * inputs[:, :2]:
+            above = max(0.0, min(100.0 * (x - place), x - place + one.damping * v))
+            less = -place if side == 0 else place
+            below = max(0.0, min(100.0 * (less - x), less - x - one.damping * v))
+            expected.append({1: above, -1: below, 0: above - below}[side])
+        np.testing.assert_allclose(column, expected, atol=1e-12)
+    # One number more than without, that was estimated.
+    assert [pool.length(term) for term in terms] == [pool.length(entered(pool, bare, 100)) + 5.0] * len(terms)
+    of_command = Hinge((2,), (1.0,), (), 1, 0.3)
+    assert damped([of_command, replace(bare, place=0.0)], signals) == []
+
+
+def test_hinges_are_read_off_terms_that_are_there():
+    pool, first = Pool(3), Hinge((0,), (1.0,), (), 1, 0.4)
+    second = replace(first, side=-1, place=-0.7)
+    terms = [entered(pool, first, 9), pool.product(1, entered(pool, second, 9)), pool.add("max", 1, 0.0), 2]
+    assert begun(pool, terms, RAIL) == [first, second]
+    assert begun(pool, [entered(pool, Hinge((2,), (1.0,), (), 1, 0.3), 9)], RAIL) == []
+
+
+def test_what_is_made_of_a_hinge_costs_what_its_place_does():
+    pool, hinge = Pool(3), Hinge((0,), (1.0,), (), 1, 0.4)
+    inside = pool.add("max", pool.add("-", pool.share(0, 1.0), 0.4), 0.0)
+    wrapped, product = pool.add("sin", inside), pool.product(2, inside)
+    before = [pool.length(node) for node in (inside, wrapped, product)]
+    assert entered(pool, hinge, 100) == inside
+    more = pool.length(inside) - before[0]
+    assert more > 5.0
+    assert [pool.length(node) for node in (wrapped, product)] == [before[1] + more, before[2] + more]
+    # A square that is dearer than it is written is not a place.
+    square = pool.product(1, 1)
+    cubic = pool.length(pool.product(square, 2))
+    pool.found[square] = 10.0
+    assert pool.length(pool.product(square, 2)) == cubic
 
 
 @pytest.mark.parametrize("least", [-1.0, 0.5])

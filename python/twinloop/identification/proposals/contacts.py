@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.drives import drive
 from twinloop.identification.search.noise import first_noise, still
@@ -14,7 +15,7 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
 from twinloop.identification.starts import CONTACTS
-from twinloop.identification.terms.hinges import Hinge, entered, hinges, limits
+from twinloop.identification.terms.hinges import Hinge, begun, damped, entered, hinges, limits
 from twinloop.identification.terms.libraries import periodic
 from twinloop.law.actuation import Actuation
 
@@ -44,20 +45,24 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if context.several:
         # In one short run a bend of what drives a chain stands in for any contact.
         every += limits(_drives(context, hypothesis, problem), problem.stages.start)
+    placed = settled(hypothesis)
+    there = begun(placed.pool, [term for found in placed.sums for term in found.weights], context.signals)
     searches, start = 0, hypothesis.start + CONTACTS
     for variant in bases:
         tried = replace(variant, start=start, searches=searches)
         few, searches = _screened(context, tried, every), searches + 1
-        if not few:
-            continue
-        # Both sides are looked at among the few that a short search has come across.
-        grown = tried.candidates.growing()
-        terms = [entered(grown.pool, hinge, len(every)) for hinge in few]
-        found = replace(tried, candidates=grown.with_terms(terms), fit=None, searches=searches)
-        found = from_both_sides(context, found, found.sums)
-        searches = found.searches
-        if any(term in sum_.weights for sum_ in found.sums for term in terms):
-            yield fitted(context, found)
+        # Both sides are looked at among the few that a short search has come across, bare and with their dampers.
+        dampers = damped([*few, *there], context.signals)
+        for bare, new in (([], few), (few, dampers)):
+            if not new:
+                continue
+            grown = tried.candidates.growing()
+            terms = [entered(grown.pool, hinge, len(every)) for hinge in (*bare, *new)]
+            found = replace(tried, candidates=grown.with_terms(terms), fit=None, searches=searches)
+            found = from_both_sides(context, found, found.sums)
+            searches = found.searches
+            if any(term in sum_.weights for sum_ in found.sums for term in terms[-len(new) :]):
+                yield fitted(context, found)
 
 
 def _drives(context: Context, hypothesis: Hypothesis, problem: Problem) -> Iterator[dict[int, float]]:

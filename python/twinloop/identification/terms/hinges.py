@@ -2,8 +2,9 @@
 
 A stop pushes once it is touched, a gear turns its load once the play is used up, a valve lets nothing through before it
 is a little open. No polynomial says so. A hinge max(0, z - c) does (Friedman 1991), and times the rate of z it is what
-a contact loses (Hunt and Crossley 1975). At a speed v a motor of limited power gives u - max(0, u v - c) / v. A servo
-that turns only so fast follows z = k (u - x) by z - max(0, z - c) + max(0, -z - c).
+a contact loses (Hunt and Crossley 1975); or a damper stands beside the spring, and neither pulls. At a speed v a motor
+of limited power gives u - max(0, u v - c) / v. A servo that turns only so fast follows z = k (u - x) by
+z - max(0, z - c) + max(0, -z - c).
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop.identification.terms.libraries import periodic, rates
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.expressions import CONSTANT, SHARE
+from twinloop.law.play import FIRM
 from twinloop.signals import Signals
 
 PLACES = 16
@@ -26,7 +29,9 @@ PLACES = 16
 LIMITS = 6
 """Places that are tried between the least and the largest of what drives a chain, and as many among its values."""
 PROPORTION = 5.0
-"""Nats that a hinge of a drive must gain for each of its weights, which were estimated."""
+"""Nats that a hinge must gain for each weight of a drive and for a damping, which were estimated."""
+DAMPINGS = (0.1, 0.3, 1.0, 3.0)
+"""What holds back over what pushes back, periods, that is tried: a contact of which more is seen than one reading."""
 NEGLIGIBLE = 0.02
 """Share of what the strongest input of a drive moves that another one has to move to count."""
 MOST = 400
@@ -49,6 +54,7 @@ class Hinge:
         place: c.
         over: a state and its scale that z is the input times, and the term is over: what a limited power takes from the
             input; None: there is none.
+        damping: of what pushes back, over its stiffness, s; 0: without a damper.
     """
 
     inputs: tuple[int, ...]
@@ -57,6 +63,7 @@ class Hinge:
     side: int
     place: float = 0.0
     over: tuple[int, float] | None = None
+    damping: float = 0.0
 
     @property
     def is_plain(self) -> bool:
@@ -123,30 +130,79 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
     speed = None if hinge.over is None else pool.share(*hinge.over)
     if speed is not None:
         coordinate = pool.product(coordinate, speed)
-    # At rest there is no place that could be tuned.
-    beyond = pool.add("-", coordinate, hinge.place) if hinge.place else coordinate
-    above = pool.add("max", beyond, 0.0)
-    place = hinge.place if hinge.side else -hinge.place
-    below = pool.add("max", pool.add("-", pool.constant(place), coordinate), 0.0)
+    above, below = (_depth(pool, hinge, coordinate, sign) for sign in (1, -1))
     if hinge.side:
         force = depth = above if hinge.side > 0 else below
     else:
         force, depth = pool.add("-", above, below), pool.add("+", above, below)
-    if hinge.rates:
-        first, *second = hinge.rates
-        force = pool.product(depth, pool.add("-", first, second[0]) if second else first)
+    if hinge.rates and not hinge.damping:
+        force = pool.product(depth, _difference(pool, hinge.rates))
     if speed is not None:
         force = pool.add("/", force, speed)
-    of_drive = PROPORTION * len(hinge.inputs) * (not hinge.is_plain)
-    pool.found.setdefault(force, WORTH + float(log(tried)) + of_drive)
+    estimated = len(hinge.inputs) * (not hinge.is_plain) + (hinge.damping > 0.0)
+    pool.found.setdefault(force, WORTH + float(log(tried)) + PROPORTION * estimated)
     return force
+
+
+def begun(pool: Pool, terms: Iterable[int], signals: Signals) -> list[Hinge]:
+    """Hinges of states that some terms are made of.
+
+    Args:
+        pool: with the terms.
+        terms: some.
+        signals: of the system.
+    """
+    found = []
+    for number in pool.needed(terms):
+        beyond = pool[number].operands[0] if pool[number].operation == "max" else pool.one
+        if pool[beyond].operation == "-":
+            above = pool[beyond].operands
+            for side, (coordinate, place) in ((1, above), (-1, above[::-1])):
+                state = pool[coordinate].operands[0] if pool[coordinate].operation == SHARE else pool.one
+                if state < signals.n_x and pool[place].operation == CONSTANT:
+                    weight = 1.0 / signals.states[state].scale
+                    found.append(Hinge((state,), (weight,), (), side, pool[place].value))
+    return found
+
+
+def damped(few: Iterable[Hinge], signals: Signals) -> list[Hinge]:
+    """What pushes back with a damper where one of some hinges begins, of those whose coordinate has a rate.
+
+    Args:
+        few: hinges that may be there.
+        signals: of the system.
+    """
+    begins = [hinge for hinge in few if hinge.is_plain and hinge.over is None and hinge.place]
+    own = [(hinge, _rates_of(signals, hinge.inputs)) for hinge in begins]
+    places = dict.fromkeys(replace(hinge, rates=rates) for hinge, rates in own if rates)
+    return [replace(one, damping=share * signals.dt) for one in places for share in DAMPINGS]
+
+
+def _depth(pool: Pool, hinge: Hinge, coordinate: int, sign: int) -> int:
+    """The node of how far a coordinate is beyond the place on one side, with what its damper adds; never below 0."""
+    if sign > 0:
+        # At rest there is no place that could be tuned.
+        beyond = pool.add("-", coordinate, hinge.place) if hinge.place else coordinate
+    else:
+        place = hinge.place if hinge.side else -hinge.place
+        beyond = pool.add("-", pool.constant(place), coordinate)
+    if hinge.damping:
+        rate = pool.share(_difference(pool, hinge.rates), 1.0 / hinge.weights[0])
+        pushed = pool.add("+", beyond, pool.product(rate, pool.constant(sign * hinge.damping)))
+        beyond = pool.add("min", pool.share(beyond, 1.0 / FIRM), pushed)
+    return pool.add("max", beyond, 0.0)
+
+
+def _difference(pool: Pool, inputs: Sequence[int]) -> int:
+    """The node of an input, or of one less another."""
+    first, *second = inputs
+    return pool.add("-", first, second[0]) if second else first
 
 
 def _coordinate(pool: Pool, hinge: Hinge) -> int:
     """The node of z; where it is no input and no difference of two, its weights are constants that may be tuned."""
     if hinge.is_plain:
-        single = len(hinge.inputs) == 1
-        return pool.share(hinge.inputs[0] if single else pool.add("-", *hinge.inputs), 1.0 / hinge.weights[0])
+        return pool.share(_difference(pool, hinge.inputs), 1.0 / hinge.weights[0])
     parts = [
         pool.product(pool.constant(weight), each)
         for weight, each in zip(hinge.weights, hinge.inputs, strict=True)
@@ -197,13 +253,11 @@ def _kinds(signals: Signals, positive: Sequence[int]) -> Iterator[Hinge]:
         positive: states that a command may be limited by its product with.
     """
     states, moving = signals.states, rates(signals)
-    of = {state.derivative_of: i for i, state in enumerate(states) if state.derivative_of is not None}
     resting = [i for i in range(signals.n_x) if i not in moving and i not in periodic(signals)]
     alone = [((i,), (1, -1)) for i in resting]
     between = [((i, j), (0,)) for i, j in combinations(resting, 2) if states[i].unit == states[j].unit]
     for inputs, sides in (*alone, *between):
-        names = [states[i].name for i in inputs]
-        own = tuple(of[name] for name in names) if all(name in of for name in names) else ()
+        own = _rates_of(signals, inputs)
         for side in sides:
             for moved in dict.fromkeys(((), own)):
                 weight = 1.0 / states[inputs[0]].scale
@@ -214,6 +268,14 @@ def _kinds(signals: Signals, positive: Sequence[int]) -> Iterator[Hinge]:
         for state in positive:
             for side in (1, -1) if state not in periodic(signals) else ():
                 yield Hinge((place,), (1.0,), (), side, over=(state, states[state].scale))
+
+
+def _rates_of(signals: Signals, inputs: Sequence[int]) -> tuple[int, ...]:
+    """States that are declared the derivatives of some inputs; none where one has none."""
+    of = {state.derivative_of: i for i, state in enumerate(signals.states) if state.derivative_of is not None}
+    names = [signals.states[i].name for i in inputs if i < signals.n_x]
+    fits = len(names) == len(inputs) and all(name in of for name in names)
+    return tuple(of[name] for name in names) if fits else ()
 
 
 def _places(values: Floats, count: int) -> list[float]:

@@ -27,6 +27,8 @@ from twinloop.records import Record, Recorded, checked_record, plain, read
 
 MOST_LEAVES = 10_000
 """Inputs and constants of one expression: a record with more is refused, for it would never be worked through."""
+NO_PARTS = (INPUT, CONSTANT, SHARE, "*")
+"""Operations of nodes that cost within an expression what they are written with, however they are priced alone."""
 
 
 class Pool(Expressions, Recorded, kind="pool"):
@@ -48,6 +50,7 @@ class Pool(Expressions, Recorded, kind="pool"):
         self.found: dict[int, float] = {}
         self._lengths: dict[int, float] = {}
         self._hidden: dict[int, frozenset[int]] = {}
+        self._made_of: dict[int, frozenset[int]] = {}
         for place in range(inputs):
             self.input(place)
         self.one = self.constant(1.0)
@@ -112,6 +115,7 @@ class Pool(Expressions, Recorded, kind="pool"):
         other.nodes, other._numbers = list(self.nodes), dict(self._numbers)
         other.rungs, other.found = dict(self.rungs), dict(self.found)
         other._lengths, other._hidden = dict(self._lengths), dict(self._hidden)
+        other._made_of = dict(self._made_of)
         return other
 
     def extends(self, other: Pool) -> bool:
@@ -183,14 +187,36 @@ class Pool(Expressions, Recorded, kind="pool"):
         It is linear, made of one input twice, or of two inputs: three kinds, and a choice within the kind, for laws of
         machines are as often quadratic as linear. Each further input or constant is a choice of its own, with its
         operation, and so is each function: where rates have one sign only, |rate| must not be as short as -rate.
+        A part that was found among many costs what it does alone, such as the place where a stop begins.
         """
         if number in self.found:
             return self.found[number]
-        if number not in self._lengths:
-            self._lengths[number] = self._written(number)
-        return self._lengths[number]
+        written = self._written(number)
+        return written if self._parts(number).isdisjoint(self.found) else written + self._owed(number)
+
+    def _parts(self, number: int) -> frozenset[int]:
+        """What an expression is made of, without itself, inputs, constants and products."""
+        if number not in self._made_of:
+            parts = (part for part in self.needed([number]) if self[part].operation not in NO_PARTS)
+            self._made_of[number] = frozenset(parts) - {number}
+        return self._made_of[number]
+
+    def _owed(self, number: int) -> float:
+        """What the parts of an expression cost beyond how they are written, the largest that were found."""
+        owed = 0.0
+        for operand in self[number].operands:
+            if operand in self.found and self[operand].operation not in NO_PARTS:
+                owed += max(0.0, self.found[operand] - self._written(operand))
+            else:
+                owed += self._owed(operand)
+        return owed
 
     def _written(self, number: int) -> float:
+        if number not in self._lengths:
+            self._lengths[number] = self._as_written(number)
+        return self._lengths[number]
+
+    def _as_written(self, number: int) -> float:
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
         operation = float(log(self.operations))
