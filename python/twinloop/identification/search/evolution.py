@@ -7,7 +7,7 @@ term.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from twinloop import _core
 from twinloop._ground.elementary import log
@@ -83,15 +83,25 @@ def _grown(
     signals: Signals,
     room: Sequence[Bounds],
 ) -> list[int]:
-    """Parents and new nodes, as many as are judged at once, or as can be drawn."""
+    """Parents and new nodes, as many as are judged at once, or as can be drawn, less those infinite in the room.
+
+    No others are drawn in place of these: what stands in for a quotient is no better.
+    """
     candidates = dict.fromkeys(parents)
     tries = 0
     while len(candidates) < options.population and tries < 20 * options.population:
         tries += 1
-        node = _drawn(pool, parents, options.operators, draw, signals, room)
+        node = _drawn(pool, parents, options.operators, draw, signals)
         if node is not None and pool.length(node) <= options.longest:
             candidates.setdefault(node)
-    return list(candidates)
+    known = set(pool.needed(parents))
+    return [node for node in candidates if _is_finite(pool, set(pool.needed([node])) - known, signals, room)]
+
+
+def _is_finite(pool: Pool, new: Collection[int], signals: Signals, room: Sequence[Bounds]) -> bool:
+    """Whether none of some nodes divides by what may be 0."""
+    quotients = (pool[node] for node in new if pool[node].operation == "/")
+    return all(divides(pool, one.operands[1], signals.n_x, room) for one in quotients)
 
 
 def _surviving(pool: Pool, survivors: Mapping[int, int], best: Sequence[Sum], unused: int) -> dict[int, int]:
@@ -108,14 +118,9 @@ def _surviving(pool: Pool, survivors: Mapping[int, int], best: Sequence[Sum], un
 
 
 def _drawn(
-    pool: Pool,
-    parents: Sequence[int],
-    operators: Sequence[str],
-    draw: _core.Stream,
-    signals: Signals,
-    room: Sequence[Bounds] = (),
+    pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _core.Stream, signals: Signals
 ) -> int | None:
-    """A new node of inputs and parents; None where it makes no sense, as a quotient does that is infinite in the room.
+    """A new node of inputs and parents; None where it makes no sense.
 
     Products and sizes are what they are in any unit. For all else, and for constants, parents are in units of their
     sizes, two inputs of one unit in those of the first.
@@ -143,8 +148,6 @@ def _drawn(
     if operation == "*":
         return pool.add(operation, a, b)
     if operation == "/":
-        if not divides(pool, b, signals.n_x, room):
-            return None
         return pool.add(operation, a, in_shares(pool, b, signals))
     if max(a, b) < signals.n_x and signals.states[a].unit == signals.states[b].unit:
         scale = size(pool, a, signals)
