@@ -202,7 +202,7 @@ class Pool(Expressions, Recorded, kind="pool"):
         return self._made_of[number]
 
     def _owed(self, number: int) -> float:
-        """What the parts of an expression cost beyond how they are written, the largest that were found."""
+        """What the parts of an expression cost beyond how they are written: of those that were found, the outermost."""
         owed = 0.0
         for operand in self[number].operands:
             if operand in self.found and self[operand].operation not in NO_PARTS:
