@@ -137,6 +137,7 @@ ABLATIONS: dict[str, Ablation] = {
     "alone": Ablation("flown gains compared without their excitation", {"alone": False}),
     "exploit-last": Ablation("a last flight that only exploits", {"exploit_last": False}),
     "margin": Ablation("the margin of the envelope", {"margin": 0.0}),
+    "ends": Ablation("flights that keep the envelope if the law ends where flights were", {"ends": False}),
     "seen": Ablation("flights near the states seen until a prediction came true", {"reach_seen": 0.0}),
     "reach": Ablation("flights that stay near those flown before", {"reach_first": 1.0}),
 }

@@ -47,8 +47,8 @@ FRONTS = {
         "priors sizes"
     ),
     "law": (
-        "accuracy actuation beginning equations expressions flight flown forms law levels noise parsing pieces play "
-        "reports twin uncertainty"
+        "accuracy actuation beginning ending equations expressions flight flown forms law levels noise parsing pieces "
+        "play reports twin uncertainty"
     ),
     "law/exports": "environment export gymnasium_source taking",
     "law/exports/fmu": "running unit",

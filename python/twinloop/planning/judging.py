@@ -48,6 +48,8 @@ class Committee:
         tuned_delayed: such models with less of it, on which gains are also tuned.
         explains: whether the best one explains the runs.
         gusts: disturbances that are known; None: nothing disturbs.
+        foretells: whether what it foretold last came true.
+        endings: the best one where what states do ends where flights have been.
     """
 
     members: Sequence[_core.Model]
@@ -58,6 +60,7 @@ class Committee:
     gusts: Gusts | None = None
     tuned_delayed: Sequence[_core.Model] = ()
     foretells: bool = False
+    endings: Sequence[_core.Model] = ()
 
     @property
     def predicts_limits(self) -> bool:

@@ -15,6 +15,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Purpose
 from twinloop.controllers import Family
+from twinloop.planning.beyond import bears_endings
 from twinloop.planning.candidates import candidates, directions_of, unknown_excitation
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, swing_of
@@ -146,6 +147,10 @@ class Planner(Judge):
     def disturbances(self, committee: Committee, draws: int) -> Floats | None:
         """Draws of the disturbances in which gains are tuned and compared (draws, n, n_x); None: in calm."""
         return committee.disturbances(draws, self.task.steps) if self.options.tuned_in_gusts else None
+
+    def bears_endings(self, committee: Committee, genes: Floats) -> bool:
+        """Whether gains (size,) keep the envelope if what states do ends where flights have been."""
+        return bool(bears_endings(self, committee, self.options.margin, genes[np.newaxis]).all())
 
     # Proposing
 

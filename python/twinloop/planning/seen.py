@@ -25,6 +25,13 @@ class Seen:
     flights: Floats
     task: Floats
 
+    @property
+    def both(self) -> Floats:
+        """Smallest and largest value of each state in flights and task (2, n_x)."""
+        return np.stack(
+            [np.minimum(self.flights[0], self.task[0]), np.maximum(self.flights[1], self.task[1])]
+        )
+
     def around(self, reach: float, signals: Signals) -> Floats:
         """Bounds of states (2, n_x): wider than flights and task by some times as far as flights have moved each.
 
@@ -36,5 +43,5 @@ class Seen:
         """
         hardly = HARDLY * np.array([state.scale for state in signals.states])
         moved = np.maximum(self.flights[1] - self.flights[0], hardly)
-        low, high = np.minimum(self.flights[0], self.task[0]), np.maximum(self.flights[1], self.task[1])
+        low, high = self.both
         return np.stack([low - reach * moved, high + reach * moved])

@@ -45,6 +45,8 @@ class PlanningOptions:
             predictions in a row that came true; for flights for the model, to that of the first flight.
         reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
             flights have moved them, until a prediction has come true; 0: anywhere.
+        ends: whether, from the third flight on, new gains must keep the envelope also if what a state does ends where
+            flights and the task have been, one state at a time and all of them.
         evaluations: number of flights on which gains are tuned at most, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
@@ -84,6 +86,7 @@ class PlanningOptions:
     reach_least: float = 0.2
     reach_growth: float = 1.25
     reach_seen: float = 4.0
+    ends: bool = True
     evaluations: int = 12_000
     tuning_starts: int = 3
     tuning_members: int = 4

@@ -19,6 +19,7 @@ from twinloop.campaign.identify_and_plan import method as method_of_default
 from twinloop.faces.result import summary
 from twinloop.law.actuation import Actuation
 from twinloop.law.noise import Noise
+from twinloop.planning.planner import Planner
 
 
 @pytest.fixture
@@ -379,6 +380,56 @@ def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further
     with confirmed:
         campaign = told(begin(options=limits), pendulum)
         assert same_bits(campaign.best_test.genes, campaign._method._gains(campaign._book))
+
+
+def test_from_the_third_flight_on_gains_must_bear_that_what_states_do_ends_where_flights_and_task_were(
+    begin, pendulum
+):
+    campaign = begin()
+    test = campaign.test(PENDULUM_GAINS)
+    for told_so_far in range(3):
+        if told_so_far:
+            _ = campaign.twin
+            method, book = campaign._method, campaign._book
+            ended = method._committee(book).endings
+            assert len(ended) == (0 if told_so_far == 1 else 3)
+            test = campaign.ask()
+        campaign.tell(test, pendulum.run(test))
+    readings = np.concatenate([run.trajectory.states for run in book.experiments[:2]])
+    ends = np.array([book.setup.initial_state, book.setup.target_state])
+    highest = np.maximum(readings.max(axis=0), ends.max(axis=0))
+
+    def moved(law, beyond):
+        """By how much the rate changes in a period, from so far beyond what was seen."""
+        return law.step([highest + beyond], [[0.0]])[0, 1] - highest[1] - beyond
+
+    # Beyond, states do what they did at their ends; the law itself goes on.
+    assert moved(ended[-1], 10.0) == pytest.approx(moved(ended[-1], 20.0), rel=1e-9)
+    assert abs(moved(method._committee(book).members[0], 10.0) - moved(ended[-1], 10.0)) > 0.1
+
+
+def test_without_the_option_nothing_ends(begin, pendulum):
+    campaign = begin(options={"ends": False})
+    test = campaign.test(PENDULUM_GAINS)
+    for _ in range(2):
+        campaign.tell(test, pendulum.run(test))
+        test = campaign.ask()
+    assert not campaign._method._committee(campaign._book).endings
+
+
+def test_a_controller_to_fly_that_relies_on_what_no_flight_has_shown_leads_no_further_than_the_next_flight(
+    begin, pendulum
+):
+    confirmed = mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=1)
+    campaign = told(begin(), pendulum)
+    with confirmed, mock.patch.object(Planner, "bears_endings", return_value=False):
+        with mock.patch.object(Planner, "propose", autospec=True, side_effect=Planner.propose) as proposed:
+            _ = campaign.best_test
+        assert proposed.called
+    campaign = told(begin(), pendulum)
+    with confirmed, mock.patch.object(Planner, "propose", autospec=True) as proposed:
+        _ = campaign.best_test
+    assert not proposed.called
 
 
 @pytest.mark.parametrize("bears", [True, False])

@@ -31,6 +31,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
+from twinloop.law.ending import endings
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -265,9 +266,13 @@ class IdentifyAndPlan:
         return answer
 
     def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
-        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with."""
+        """Tuned gains; only those that the next flight may be flown with where they may lead too far.
+
+        So they may as long as no prediction has come true, and where they rely on what no flight has shown.
+        """
         flown = self._flown(book, standing.best_flown(book), tuned, committee)
-        if flown.seen is None or not committee.predicts_limits:
+        near = flown.seen is None and self.planner.bears_endings(committee, tuned)
+        if near or not committee.predicts_limits:
             return tuned
         goal, number = self.setup.goal, len(book.tests)
         found = self.planner.propose(committee, tuned, flown, goal, number, exploit=True, last=True)
@@ -323,7 +328,17 @@ class IdentifyAndPlan:
             self._gusts(latest, len(book.experiments)),
             slower(TUNED_WITH) if true else borne,
             latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
+            self._endings(latest, book),
         )
+
+    def _endings(self, latest: Learnt, book: Logbook) -> list[_core.Model]:
+        """The best law where what states do ends where flights and the task have been; none after a first flight.
+
+        That one is gentle: gains that do better lead where it has not been.
+        """
+        if not self.options.ends or len(book.experiments) < 2:
+            return []
+        return endings(latest.believed[0], self.setup.signals, self._seen(book).both)
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
         """Disturbances that are known, drawn once for each lesson; none that are known to be a model error."""
