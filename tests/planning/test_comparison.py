@@ -187,10 +187,8 @@ def test_a_member_that_goes_too_far_whatever_is_flown_has_no_say_unless_it_is_th
 
 def keeping(usage):
     """Which candidates stay within what may be used after a flight that has used 70 %, by usages on each member."""
-    reach = min(
-        max(PLANNER.options.reach_first, PLANNER.options.reach_growth * 0.7), 1.0 - PLANNER.options.margin
-    )
-    return usage.max(axis=(0, 1)) <= reach
+    left = 1.0 - PLANNER.options.margin - 0.7
+    return usage.max(axis=(0, 1)) <= 0.7 + PLANNER.options.reach_rest * left
 
 
 def test_a_plain_flight_is_the_one_that_promises_most_beside_the_tuned_one_that_was_passed_over():

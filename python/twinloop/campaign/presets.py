@@ -205,6 +205,7 @@ _DEFAULT_RANGES: dict[str, tuple[float, float]] = {
     "reach_first": (0.01, 1),
     "reach_far": (0.01, 1),
     "reach_least": (0.01, 1),
+    "reach_rest": (0, 1),
     "reach_growth": (0.1, 100),
     "reach_seen": (0, 1e6),
     "evaluations": (64, _MANY),

@@ -61,7 +61,9 @@ def stored(
         begun = time * first[rows][0].item() if hidden.settled else 0.0
         values = list(accumulate(added[rows].tolist(), lambda now, more: kept * now + more, initial=begun))
         start[rows], end[rows] = values[:-1], values[1:]
-    slopes = first - start / time, last - end / time
-    middle = 0.5 * (start + end) + dt / 8.0 * (slopes[0] - slopes[1])
+    # A time far below a period lasts no run in such steps: what is not finite explains nothing.
+    with np.errstate(over="ignore", invalid="ignore"):
+        slopes = first - start / time, last - end / time
+        middle = 0.5 * (start + end) + dt / 8.0 * (slopes[0] - slopes[1])
     parts = (np.real, np.imag) if turning else (np.real,)
     return tuple(np.stack([part(each) for part in parts], axis=1) for each in (start, middle, end))  # type: ignore[return-value]

@@ -38,7 +38,7 @@ class Flown:
     Args:
         best: genes of the best flight; those tuned where no test was flown.
         flies: whether they are known to fly: to the end, and inside the envelope.
-        usages: largest usage of the envelope in each flight.
+        usages: largest usage of the envelope in each flight that kept it; in each flight where none has.
         good: quality of the best flight that kept the envelope; infinite where none has: one that keeps it may then be
             worse.
         failed: genes of tests that failed on the system, or were cut.
@@ -46,7 +46,6 @@ class Flown:
         fared: how these flights have ended.
         borne: how many of the last flights whose excitation was held back kept the envelope.
         seen: where the flights have been, as long as no prediction has come true.
-        came_true: how many of the last predictions in a row have, where the committee explains the flights.
     """
 
     best: Floats
@@ -58,7 +57,6 @@ class Flown:
     fared: Fared = Fared(1, 0)
     borne: int = 1
     seen: Seen | None = None
-    came_true: int = 0
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ def reach_of(flown: Flown, goal: str, options: PlanningOptions) -> float:
     """
     used = flown.usages
     first, most = used[0] if used else 0.0, max(used, default=0.0)
-    # A model is believed near what was flown: each flight may go somewhat further than those before it, and the more so
-    # the more of what it foretold has come true.
-    near = max(options.reach_first, options.reach_growth ** (1 + flown.came_true) * most)
+    # A model is believed near what was flown: each flight may go on by a share of what is left beyond those before it.
+    # That of these much has come true tells nothing of what is there: a wing has not stalled until it does.
+    near = max(options.reach_first, most + options.reach_rest * max(0.0, 1.0 - options.margin - most))
     # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
     # further a flight goes: what is small on the first flight, and in no term, is not small then.
     far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)

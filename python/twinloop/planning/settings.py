@@ -41,8 +41,8 @@ class PlanningOptions:
         reach_first: usage of the envelope that a proposal may always have.
         reach_far: largest usage of flights for the model, whose gains may be far from any that were flown.
         reach_least: usage that such flights may always have, even if the first flight hardly moves.
-        reach_growth: largest ratio of a proposal's usage to the largest flown one, once more for each of the last
-            predictions in a row that came true; for flights for the model, to that of the first flight.
+        reach_rest: share of what flights have left unused, less the margin, by which a proposal may use more than they.
+        reach_growth: largest ratio of the usage of a flight for the model to that of the first flight.
         reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
             flights have moved them, until a prediction has come true; 0: anywhere.
         ends: whether, from the third flight on, new gains must keep the envelope also if what a state does ends where
@@ -84,6 +84,7 @@ class PlanningOptions:
     reach_first: float = 0.7
     reach_far: float = 0.6
     reach_least: float = 0.2
+    reach_rest: float = 0.5
     reach_growth: float = 1.25
     reach_seen: float = 4.0
     ends: bool = True

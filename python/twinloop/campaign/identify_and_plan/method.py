@@ -162,7 +162,7 @@ class IdentifyAndPlan:
         found = self.planner.propose(
             committee,
             tuned,
-            self._flown(book, best, tuned, committee),
+            self._flown(book, best, tuned),
             self.setup.goal,
             len(book.tests),
             final or (self.setup.goal == "control" and len(book.flown) > 1 and not waits),
@@ -215,9 +215,8 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, asked=self._latest(), under_way=None)
         return test
 
-    def _flown(self, book: Logbook, best: Test | None, tuned: Floats, committee: Committee) -> Flown:
+    def _flown(self, book: Logbook, best: Test | None, tuned: Floats) -> Flown:
         """What the planner has to know of the flights so far."""
-        came_true = nearly_confirmed_in_a_row(book.experiments)
         known = best is not None and standing.flies(book, best.number)
         good = None
         if best is not None and known and standing.on_task(book, best):
@@ -225,14 +224,14 @@ class IdentifyAndPlan:
         return Flown(
             tuned if best is None else best.genes,
             known,
-            [run.usage for run in book.experiments],
+            [run.usage for run in book.experiments if run.kept_envelope]
+            or [run.usage for run in book.experiments],
             float("inf") if good is None else good,
             standing.unfit(book),
             times=1 if best is None else standing.times_flown(book, best.genes),
             fared=Fared(0, 0) if best is None else standing.fared(book, best.genes, excited=True),
             borne=standing.borne(book),
-            seen=None if came_true else self._seen(book),
-            came_true=came_true if committee.explains else 0,
+            seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
         )
 
     def _seen(self, book: Logbook) -> Seen:
@@ -270,7 +269,7 @@ class IdentifyAndPlan:
 
         So they may as long as no prediction has come true, and where they rely on what no flight has shown.
         """
-        flown = self._flown(book, standing.best_flown(book), tuned, committee)
+        flown = self._flown(book, standing.best_flown(book), tuned)
         near = flown.seen is None and self.planner.bears_endings(committee, tuned)
         if near or not committee.predicts_limits:
             return tuned
