@@ -8,7 +8,7 @@ import pytest
 from committees import TASK, committee_of, member, planner_of, signals
 from oracles import same_bits
 from twinloop._ground.streams import Unit
-from twinloop.planning.proposal import Flown
+from twinloop.planning.proposal import Flown, Wanted
 from twinloop.planning.reach import bounds_of, reach_of
 from twinloop.planning.seen import Seen
 from twinloop.planning.within import tune_within
@@ -16,6 +16,7 @@ from twinloop.planning.within import tune_within
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
 PLANNER = planner_of(KNOWN, candidates=64, evaluations=4096)
 COMMITTEE = committee_of(KNOWN)
+WANTED = Wanted("both", 3, exploit=False)
 GENTLE = np.array([0.3, 0.0, 1.5])
 SLOW = np.array([[-0.9, -0.4], [0.9, 0.4]])
 """Bounds in which the motor may turn at 0.4 rad/s at most."""
@@ -65,7 +66,7 @@ def test_where_the_tuned_gains_lead_too_far_the_best_within_the_limits_fly(explo
     quick = np.array([9.0, 0.0, 1.0])
     seen = Seen(np.array([[0.4, -0.05], [0.5, 0.02]]), np.array([[0.4, 0.0], [0.5, 0.0]]))
     flown = Flown(best=GENTLE, flies=True, usages=[0.56], good=1.0, seen=seen)
-    bounds = bounds_of(flown, "both", KNOWN, PLANNER.options)
+    bounds = bounds_of(flown, WANTED, KNOWN, PLANNER.options)
     promised = {}
     for switched in (True, False):
         planner = planner_of(KNOWN, candidates=64, evaluations=4096, within=switched)
@@ -82,17 +83,20 @@ def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_nea
     seen = Seen(np.array([[0.0, -0.1], [0.5, 0.1]]), np.zeros((2, 2)))
     flown = Flown(best=GENTLE, flies=True, usages=[0.6], good=1.0, seen=seen)
     options = replace(PLANNER.options, reach_seen=1.0)
-    reach, near = reach_of(flown, "both", options), seen.around(1.0, KNOWN)
-    low, high = bounds_of(flown, "both", KNOWN, options)
+    reach, near = reach_of(flown, WANTED, options), seen.around(1.0, KNOWN)
+    low, high = bounds_of(flown, WANTED, KNOWN, options)
     assert reach == pytest.approx(0.75)
     np.testing.assert_allclose(low, [max(-0.9 * reach, near[0, 0]), max(-1.5 * reach, near[0, 1])])
     np.testing.assert_allclose(high, [min(0.9 * reach, near[1, 0]), min(1.5 * reach, near[1, 1])])
     # Each flight may go half as far again as is left to the margin, and as far as those before it.
     for most, further in ((0.2, 0.7), (0.5, 0.7), (0.7, 0.8), (0.8, 0.85), (0.88, 0.89), (0.95, 0.9)):
         farther = replace(flown, usages=[0.5, most])
-        assert reach_of(farther, "both", options) == pytest.approx(further)
+        assert reach_of(farther, WANTED, options) == pytest.approx(further)
+        # The last one goes hardly further than others have.
+        last = reach_of(farther, replace(WANTED, last=True), options)
+        assert last == pytest.approx(min(0.9, max(0.7, most + 0.01)))
     # Once a prediction has come true the envelope alone counts.
-    low, high = bounds_of(replace(flown, seen=None), "both", KNOWN, options)
+    low, high = bounds_of(replace(flown, seen=None), WANTED, KNOWN, options)
     np.testing.assert_allclose(high, [0.9 * reach, 1.5 * reach])
     np.testing.assert_allclose(low, -high)
     assert TASK.initial_state[0] <= high[0]

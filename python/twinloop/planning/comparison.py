@@ -55,7 +55,7 @@ class Comparison:
         self.judge, self.options, self.committee = judge, options, committee
         self.drafts, self.flown, self.wanted = drafts, flown, wanted
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
-        reach = reach_of(flown, wanted.goal, options)
+        reach = reach_of(flown, wanted, options)
         everyone = judge.judge(committee.members, genes, committee.sds, 1, excitation, ends)
         # A member that diverges whatever is flown is no member (E-SINDy). Nor is one that goes too far whatever is
         # flown, the best gains flown among them: it would forbid all flights.

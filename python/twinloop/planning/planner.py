@@ -23,7 +23,7 @@ from twinloop.planning.gains import scores_of, tune_gains
 from twinloop.planning.judging import Committee, Judge, Task
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
-from twinloop.planning.reach import bounds_of
+from twinloop.planning.reach import bounds_of, reach_of
 from twinloop.planning.scored import Score, Scored
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.within import tune_within
@@ -148,9 +148,18 @@ class Planner(Judge):
         """Draws of the disturbances in which gains are tuned and compared (draws, n, n_x); None: in calm."""
         return committee.disturbances(draws, self.task.steps) if self.options.tuned_in_gusts else None
 
-    def bears_endings(self, committee: Committee, genes: Floats) -> bool:
-        """Whether gains (size,) keep the envelope if what states do ends where flights have been."""
-        return bool(bears_endings(self, committee, self.options.margin, genes[np.newaxis]).all())
+    def is_near(self, committee: Committee, genes: Floats, flown: Flown) -> bool:
+        """Whether gains (size,) lead hardly further than flights have, and bear that what states do ends there.
+
+        Args:
+            committee: that judges.
+            genes: without excitation.
+            flown: so far.
+        """
+        one, options = genes[np.newaxis], self.options
+        usage = self.judge(committee.members, one, committee.sds, 1).worst_usage
+        reach = reach_of(flown, Wanted("control", 0, exploit=True, last=True), options)
+        return bool((usage <= reach).all() and bears_endings(self, committee, options.margin, one).all())
 
     # Proposing
 
@@ -209,12 +218,12 @@ class Planner(Judge):
             number: of the test, for its stream.
             exploit: whether the tuned gains are flown as they are.
             last: whether nothing else is: where the tuned gains cannot be, those that promise most of all that can,
-                without excitation.
+                without excitation. They lead hardly further than flights have.
 
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
-        wanted = Wanted(goal, number, exploit)
+        wanted = Wanted(goal, number, exploit, last=last)
         found = self._compared(committee, tuned, flown, wanted)
         self.watch("candidates")
         if self.options.within and committee.predicts_limits and found.possible[0] and not found.keeps[0]:
@@ -233,7 +242,7 @@ class Planner(Judge):
     def _within(self, far: Comparison) -> Comparison:
         """Candidates around the best gains within the limits of the next flight; those that there are if none are."""
         committee, flown, wanted = far.committee, far.flown, far.wanted
-        bounds = bounds_of(flown, wanted.goal, self.signals, self.options)
+        bounds = bounds_of(flown, wanted, self.signals, self.options)
         promising = np.where(far.keeps, far.quiet.mean, np.inf)
         starts = [flown.best, far.drafts.genes[int(np.argmin(promising))]]
         genes = tune_within(

@@ -68,12 +68,14 @@ class Wanted:
         number: of the test, for its streams.
         exploit: whether the tuned gains are flown as they are.
         plain: whether the test that promises most is wanted, rather than the one that tells most.
+        last: whether nothing is to be learnt from it: it need not lead where no flight has been.
     """
 
     goal: str
     number: int
     exploit: bool
     plain: bool = False
+    last: bool = False
 
 
 @dataclass(frozen=True, eq=False)

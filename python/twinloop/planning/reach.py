@@ -5,40 +5,45 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.planning.proposal import Flown
+from twinloop.planning.proposal import Flown, Wanted
 from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
 
+HAIR = 0.01
+"""By how much more of the envelope than any before it a flight may use that is to lead nowhere new."""
 
-def reach_of(flown: Flown, goal: str, options: PlanningOptions) -> float:
+
+def reach_of(flown: Flown, wanted: Wanted, options: PlanningOptions) -> float:
     """Usage of the envelope that a proposal may have, where that of each flight so far is known.
 
     Args:
         flown: so far.
-        goal: "both", "model" or "control".
+        wanted: what it is for.
         options: of the planning.
     """
     used = flown.usages
     first, most = used[0] if used else 0.0, max(used, default=0.0)
     # A model is believed near what was flown: each flight may go on by a share of what is left beyond those before it.
     # That of these much has come true tells nothing of what is there: a wing has not stalled until it does.
-    near = max(options.reach_first, most + options.reach_rest * max(0.0, 1.0 - options.margin - most))
+    left = max(0.0, 1.0 - options.margin - most)
+    # The last one has nobody to learn from it, and gains that go further are better by little.
+    near = max(options.reach_first, most + (min(HAIR, left) if wanted.last else options.reach_rest * left))
     # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
     # further a flight goes: what is small on the first flight, and in no term, is not small then.
     far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)
-    return min(1.0 - options.margin, far if goal == "model" else near)
+    return min(1.0 - options.margin, far if wanted.goal == "model" else near)
 
 
-def bounds_of(flown: Flown, goal: str, signals: Signals, options: PlanningOptions) -> Floats:
+def bounds_of(flown: Flown, wanted: Wanted, signals: Signals, options: PlanningOptions) -> Floats:
     """Bounds of the states (2, n_x) that no member may leave in the next flight; infinite where there is none.
 
     Args:
         flown: so far.
-        goal: "both", "model" or "control".
+        wanted: what it is for.
         signals: of the system.
         options: of the planning.
     """
-    reach, bounds = reach_of(flown, goal, options), np.tile([[-np.inf], [np.inf]], len(signals.states))
+    reach, bounds = reach_of(flown, wanted, options), np.tile([[-np.inf], [np.inf]], len(signals.states))
     for i, state in enumerate(signals.states):
         if state.envelope is not None:
             low, high = state.envelope

@@ -422,7 +422,7 @@ def test_a_controller_to_fly_that_relies_on_what_no_flight_has_shown_leads_no_fu
 ):
     confirmed = mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=1)
     campaign = told(begin(), pendulum)
-    with confirmed, mock.patch.object(Planner, "bears_endings", return_value=False):
+    with confirmed, mock.patch.object(Planner, "is_near", return_value=False):
         with mock.patch.object(Planner, "propose", autospec=True, side_effect=Planner.propose) as proposed:
             _ = campaign.best_test
         assert proposed.called

@@ -267,10 +267,10 @@ class IdentifyAndPlan:
     def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
         """Tuned gains; only those that the next flight may be flown with where they may lead too far.
 
-        So they may as long as no prediction has come true, and where they rely on what no flight has shown.
+        So they may as long as no prediction has come true, and where they lead further than flights have.
         """
         flown = self._flown(book, standing.best_flown(book), tuned)
-        near = flown.seen is None and self.planner.bears_endings(committee, tuned)
+        near = flown.seen is None and self.planner.is_near(committee, tuned, flown)
         if near or not committee.predicts_limits:
             return tuned
         goal, number = self.setup.goal, len(book.tests)
