@@ -79,3 +79,8 @@ def in_unit(text: str, unit: str) -> str:
         unit: of it; "" and "1" are none.
     """
     return text if unit in ("", "1") else f"{text} {unit}"
+
+
+def two_digits(value: float) -> str:
+    """A number of which two digits count, such as "0.012" or "120"; never "1.2e+02"."""
+    return f"{float(f'{value:.2g}'):g}"

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from twinloop._experiment.limits import Limits
-from twinloop._ground.texts import to_type
+from twinloop._ground.texts import to_type, two_digits
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.campaign.presets import options_of
@@ -163,5 +163,5 @@ def _text(twin: Twin, found: dict[str, Any]) -> str:
 
 def _span(values: Sequence[float]) -> str:
     """From the least to the most."""
-    least, most = (f"{value:.2g}" for value in (min(values), max(values)))
+    least, most = (two_digits(value) for value in (min(values), max(values)))
     return least if least == most else f"{least} to {most}"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
-from twinloop._ground.texts import to_type
+from twinloop._ground.texts import to_type, two_digits
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
 from twinloop.faces.text import quality_words, table
@@ -115,7 +115,7 @@ def unknown_risk(test: Test) -> str:
     ]
     text = (
         "not estimated before the first flight. It is the risk of the controller with an excitation of at most"
-        f" {max(shares):.2g} % of a command's range"
+        f" {two_digits(max(shares))} % of a command's range"
     )
     ranges = {} if test.hold_back is None else test.hold_back.ranges(signals)
     if ranges:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinloop._ground.texts import in_unit
+from twinloop._ground.texts import in_unit, two_digits
 from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator, in_periods, partners
 from twinloop.law.expansion import Expansion, Monomial, Polynomial, written
@@ -174,7 +174,7 @@ class Equations:
         return lines
 
     def _deviation(self, values: Sequence[float]) -> str:
-        return f" ± {np.std(values, ddof=1):.2g}" if len(values) > 1 else ""
+        return f" ± {two_digits(float(np.std(values, ddof=1)))}" if len(values) > 1 else ""
 
     def _offsets(self) -> list[str]:
         lines = []
@@ -228,7 +228,7 @@ class Equations:
     def _note_inside(self, node: int) -> str:
         """± of the constants of a part of an equation."""
         every = (spread for of_output in self.spreads for spread in of_output.values())
-        return ", ".join(f"± {sd:.2g}" for sd in varying_in(every, node, self.writer.names))
+        return ", ".join(f"± {two_digits(sd)}" for sd in varying_in(every, node, self.writer.names))
 
     def _filling(self, name: str, number: int) -> list[str]:
         """The equation of a hidden state that commands or states drive."""
@@ -300,8 +300,8 @@ def _note(spread: Spread, named: Collection[int]) -> str:
     having = "" if spread.having == spread.members else f" ({spread.having} of {spread.members})"
     if spread.sd is None:
         return having.strip()
-    inside = ", ".join(f"± {sd:.2g}" for sd in spread.varying(named))
-    return f"± {spread.sd:.2g}" + (f", inside {inside}" if inside else "") + having
+    inside = ", ".join(f"± {two_digits(sd)}" for sd in spread.varying(named))
+    return f"± {two_digits(spread.sd)}" + (f", inside {inside}" if inside else "") + having
 
 
 def _named(writer: Writer, note: Callable[[int], str] = lambda node: "") -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from twinloop._ground.texts import two_digits
+
 
 def risk_of(left: int, flights: int) -> float:
     """Probability that the next flight leaves the envelope, as some have left it.
@@ -70,7 +72,7 @@ def short_risk(risk: float | None, flights: int | None) -> str | None:
 
 
 def _percent(risk: float) -> str:
-    return f"{float(f'{100.0 * risk:.2g}'):g} %"
+    return f"{two_digits(100.0 * risk)} %"
 
 
 def _above(percent: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop._ground.elementary import log
+from twinloop._ground.texts import two_digits
 from twinloop.planning.proposal import Fared
 from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
@@ -87,7 +88,7 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     if why.disagreement > 0.0 and high != low:
         return (
             f"Models {high} and {low} disagree most on {signals.state_names[why.state]},"
-            f" {why.step * signals.dt:.2g} s after the start; information:"
+            f" {two_digits(why.step * signals.dt)} s after the start; information:"
             f" {why.disagreement / float(log(2.0)):.3g} bits."
         )
     return "The models agree on it: the flight tests what they have in common."

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from twinloop._experiment.envelope import is_bounded
+from twinloop._ground.texts import two_digits
 from twinloop._ground.times import shown_time
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
@@ -78,7 +79,7 @@ def _follows(follows: bool, worst: float) -> str:
 
 
 def _error(worst: float) -> str:
-    return f"error at most {worst:.2g}" if math.isfinite(worst) else "on one it diverges"
+    return f"error at most {two_digits(worst)}" if math.isfinite(worst) else "on one it diverges"
 
 
 def _of_unseen(found: Examination) -> Iterator[Check]:
@@ -92,10 +93,11 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     last = found.unseen[-1]
     which = "a log" if last.number is None else f"test {last.number}"
     good = last.error <= LEFT
+    by = f"error {two_digits(last.error)}" if math.isfinite(last.error) else "it diverged"
     yield Check(
         "unseen-flight", "twin", last.error, LEFT, good, True,
         f"Before learning it, the twin {'predicted' if good else 'did not predict'} {which}:"
-        f" {f'error {last.error:.2g}' if math.isfinite(last.error) else 'it diverged'}; at most {LEFT:g} is allowed.",
+        f" {by}; at most {LEFT:g} is allowed.",
     )  # fmt: skip
     if last.inside is not None:
         wide = last.inside >= INSIDE
@@ -108,8 +110,8 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     if miss is not None:
         near = abs(miss) <= MISSES
         missed = (
-            f"The last quality that was predicted differs from what was flown by {abs(miss):.2g} of its standard"
-            f" deviations; at most {MISSES:g} are allowed."
+            f"The last quality that was predicted differs from what was flown by {two_digits(abs(miss))} of its"
+            f" standard deviations; at most {MISSES:g} are allowed."
         )
         diverged = "No quality was predicted for the last flight: the twin diverged under its gains."
         yield Check(

@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
-from twinloop._ground.texts import in_unit
+from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.gains import FlownOtherwise, from_other_gains
 from twinloop.campaign.data.lateness import late
@@ -216,8 +216,8 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
     if worst > JITTER:
         yield serious(
             "jitter",
-            f"The time between two rows departs by up to {100.0 * worst:.2g} % from dt; {100.0 * JITTER:g} % are"
-            " allowed. Where the loop only jitters around its period, write even times.",
+            f"The time between two rows departs by up to {two_digits(100.0 * worst)} % from dt; {100.0 * JITTER:g} %"
+            " are allowed. Where the loop only jitters around its period, write even times.",
         )
 
 
@@ -311,7 +311,7 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
     elif column.moved is not None and column.moved < MOVED:
         yield note(
             "little-moved",
-            f"{name} moved only {column.moved:.2g} times its noise: below {MOVED:g} little can be learnt about"
+            f"{name} moved only {two_digits(column.moved)} times its noise: below {MOVED:g} little can be learnt about"
             " it; excite it more.",
         )
     if column.beyond:
@@ -336,8 +336,8 @@ def _of_scales(states: Floats, signals: Signals) -> Iterator[Remark]:
         elif 0.0 < most < SMALL * state.scale:
             yield note(
                 "scale",
-                f"{state.name} stays within {in_unit(f'{most:.3g}', state.unit)}, {most / state.scale:.2g} of its"
-                " scale: check its unit.",
+                f"{state.name} stays within {in_unit(f'{most:.3g}', state.unit)}, {two_digits(most / state.scale)} of"
+                " its scale: check its unit.",
             )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._experiment.envelope import outside
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import two_digits
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
@@ -120,7 +121,7 @@ class Choice:
 
     @property
     def _more(self) -> str:
-        return f"{100.0 * self._worth:.2g} % or more"
+        return f"{two_digits(100.0 * self._worth)} % or more"
 
     def _measured_better(self, flown: Test) -> str:
         """Which flight was measured better than that of the best gains: an excitation helped it, or cost these."""
@@ -198,9 +199,10 @@ class Choice:
         if promised > 1.0:
             predicted, _ = of_others()
             if not predicted * promised < alone:
+                worse = two_digits(100.0 * (promised - 1.0))
                 return (
-                    f"the last two flights were worse than predicted, both by {100 * (promised - 1):.2g} % or more, and"
-                    f" others, corrected for that, would be no better ({predicted:.3g} predicted) than these"
+                    f"the last two flights were worse than predicted, both by {worse} % or more, and others,"
+                    f" corrected for that, would be no better ({predicted:.3g} predicted) than these"
                     f" ({alone:.3g})"
                 )
         if not confirmed(self.book.experiments):
@@ -208,7 +210,7 @@ class Choice:
             if not predicted + SURE * spread < alone:
                 return (
                     "the last flight was not as predicted, and for others the twin predicts"
-                    f" {predicted:.3g} ± {spread:.2g} where {_reaches(alone, flown)}"
+                    f" {predicted:.3g} ± {two_digits(spread)} where {_reaches(alone, flown)}"
                 )
         return ""
 

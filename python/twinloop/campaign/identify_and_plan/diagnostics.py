@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.sent import from_other_controllers
@@ -154,7 +155,7 @@ def _in_pieces(experiments: Sequence[Experiment], pieces: Sequence[int], dt: flo
         if length < run.trajectory.steps
     ]
     if short:
-        least, most = (f"{length * dt:.2g}" for length in (min(short), max(short)))
+        least, most = (two_digits(length * dt) for length in (min(short), max(short)))
         yield note(
             "in-pieces",
             f"{len(short)} of the runs without a test {'was' if len(short) == 1 else 'were'} followed in pieces of"
@@ -201,7 +202,8 @@ def _missed_predictions(experiments: Sequence[Experiment]) -> Iterator[Remark]:
     if missed:
         how = "worse" if missed[-1].measured > missed[-1].predicted else "better"
         each = " and ".join(
-            f"test {found.test} ({found.predicted:.4g} ± {found.spread:.2g} predicted, {found.measured:.4g} measured)"
+            f"test {found.test} ({found.predicted:.4g} ± {two_digits(found.spread)} predicted,"
+            f" {found.measured:.4g} measured)"
             for found in missed
         )
         yield (serious if missed_in_a_row(experiments, NEARLY) else note)(
@@ -213,7 +215,11 @@ def _missed_predictions(experiments: Sequence[Experiment]) -> Iterator[Remark]:
 
 def _of_range(share: float) -> str:
     """How far a state is missed, beside how far it went: two digits of a share of 1 or more are no percentage."""
-    return f"{100.0 * share:.2g} % of its range" if share < 0.995 else f"{share:.2g} times its range"
+    return (
+        f"{two_digits(100.0 * share)} % of its range"
+        if share < 0.995
+        else f"{two_digits(share)} times its range"
+    )
 
 
 def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[Remark]:
@@ -224,7 +230,7 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
     else:
         named = [
             f"{signals.state_names[miss.state]} on {miss.flights} (up to {_of_range(miss.share)},"
-            f" {miss.times:.2g} times what noise and disturbances explain)"
+            f" {two_digits(miss.times)} times what noise and disturbances explain)"
             for miss in worst[:NAMED]
         ]
         others = [f"and {len(worst) - NAMED} more"] if len(worst) > NAMED else []

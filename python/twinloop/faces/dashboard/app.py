@@ -17,7 +17,7 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from twinloop._experiment.envelope import is_bounded
-from twinloop._ground.texts import in_unit
+from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
 from twinloop.faces.cautions import serious_of
@@ -210,7 +210,7 @@ class Pages:
                         for name, value in test.parameters.items()
                     },
                     "predicted": None if test.predicted is None else f"{test.predicted:.4g}",
-                    "spread": None if test.spread is None else f"{test.spread:.2g}",
+                    "spread": None if test.spread is None else two_digits(test.spread),
                     "unit": quality_unit(campaign.setup.quality),
                     "risk": None
                     if test.risk is None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twinloop._ground.texts import two_digits
 from twinloop.faces.text.table import cell, table
 from twinloop.faces.text.words import held_at, is_bounded, predicted_flights, with_unit
 from twinloop.planning.leaving import risk_of_what, risk_words
@@ -97,7 +98,9 @@ def advice_words(result: Mapping[str, Any]) -> str:
         return "No flight was planned yet; ask for one to see what it would bring."
     if not advice["trusted"]:
         return "The twin is not reliable yet, so it cannot say. Look into the remarks, then fly another test."
-    share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
+    share = (
+        f", {two_digits(100.0 * advice['share'])} % of what it is now" if advice["share"] is not None else ""
+    )
     words = f"When test {advice['before_test']} was planned, knowing which model is right would"
     size = None if scatter is None else with_unit(scatter, unit)
     if advice["gain"] == 0.0:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from twinloop._ground.texts import two_digits
 from twinloop.faces.text.table import cell, table
 from twinloop.law.actuation import in_periods
 
@@ -83,11 +84,13 @@ def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
     words = []
     for found in disturbances:
         name, unit = found["name"], found["unit"] or "1"
-        parts = [f"{found['white']:.2g} {unit} a period"] if found["white"] else []
+        parts = [f"{two_digits(found['white'])} {unit} a period"] if found["white"] else []
         if found["correlated"]:
             size, time = found["correlated"], found["correlation_time"]
             cause = CAUSES[found["cause"]]
-            parts.append(f"{size:.2g} ({unit})/s with a correlation time of {time:.2g} s{cause}")
+            parts.append(
+                f"{two_digits(size)} ({unit})/s with a correlation time of {two_digits(time)} s{cause}"
+            )
         words.append(f"{name} {' and '.join(parts)}")
     return f"Disturbances (standard deviations): {'; '.join(words)}."
 

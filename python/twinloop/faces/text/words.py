@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from twinloop._ground.texts import in_unit
+from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.examination.examination import Examination
 
 
@@ -30,7 +30,7 @@ QUALITIES = {
 
 def with_unit(value: float, unit: str) -> str:
     """A value in its unit."""
-    return in_unit(f"{value:.2g}", unit)
+    return in_unit(two_digits(value), unit)
 
 
 def quality_words(kind: str, unit: str) -> str:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from twinloop._ground.texts import two_digits
 from twinloop.faces.text import cell
 
 
@@ -66,4 +67,4 @@ def shown_value(value: object) -> str:
 
 def shown_spread(value: float | None) -> str | None:
     """A standard deviation, with as many digits as it is worth."""
-    return None if value is None else f"{value:.2g}"
+    return None if value is None else two_digits(value)
