@@ -243,18 +243,18 @@ def test_gains_that_have_not_flown_keep_the_envelope_with_more_delay_than_was_se
 def test_new_gains_keep_the_envelope_and_its_margin_also_where_what_states_do_ends(flies):
     # What holds it has ended: it drives itself.
     drives = (1.0, -2.0)
-    ended = replace(COMMITTEE, endings=[member(KNOWN, *drives)])
+    ended = replace(COMMITTEE, ending=member(KNOWN, *drives))
     flown = replace(FLOWN, flies=flies)
     drawn = drafts(flown, goal="both")
     bears = judged(drawn, QUIET, measured=False, motors=[drives])[1][0, 0] <= 1.0 - PLANNER.options.margin
     bears[drawn.repeats :] |= flies
     found, without = (compared(one, flown, goal="both", drawn=drawn) for one in (ended, COMMITTEE))
-    assert found._bears_endings(list(range(len(bears)))).tolist() == bears.tolist()
+    assert found._bears_ending(list(range(len(bears)))).tolist() == bears.tolist()
     assert 0 < bears[: drawn.repeats].sum() < drawn.repeats and found.keeps.tolist() == without.keeps.tolist()
     # What tells most gives way to what tells most of those that bear it.
     (before, _), (after, _) = without._trusted_choice(), found._trusted_choice()
     assert not bears[before] and bears[after] and found.tells[after] < found.tells[before]
-    nowhere = replace(COMMITTEE, endings=[member(KNOWN, -60.0, -40.0)])
+    nowhere = replace(COMMITTEE, ending=member(KNOWN, -60.0, -40.0))
     last = compared(nowhere, flown, goal="both", drawn=drawn)._trusted_choice()
     assert (last is not None and last[0] >= drawn.repeats) if flies else last is None
 

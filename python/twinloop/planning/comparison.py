@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from twinloop._experiment.envelope import outside
 from twinloop._ground.arrays import Floats
 from twinloop.flights import disagreements
-from twinloop.planning.beyond import bears_endings
+from twinloop.planning.beyond import bears_ending
 from twinloop.planning.candidates import Candidates
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
@@ -208,16 +208,16 @@ class Comparison:
         for at in range(0, min(len(ordered), TRIED), TOGETHER):
             batch = list(ordered[at : at + TOGETHER])
             flights = self._noisy(batch)
-            lasts = ~outside(flights.worst_usage) & (flights.mean <= worst) & self._bears_endings(batch)
+            lasts = ~outside(flights.worst_usage) & (flights.mean <= worst) & self._bears_ending(batch)
             for i in np.flatnonzero(lasts).tolist():
                 if self._bears_gusts(batch[i]):
                     return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
         return None
 
-    def _bears_endings(self, chosen: list[int]) -> Flags:
+    def _bears_ending(self, chosen: list[int]) -> Flags:
         """Which of some candidates keep the envelope if what states do ends where they were seen."""
         some, margin = self.drafts.some(chosen), self.options.margin
-        bears = bears_endings(self.judge, self.committee, margin, some.genes, some.excitation, some.ends)
+        bears = bears_ending(self.judge, self.committee, margin, some.genes, some.excitation, some.ends)
         # Gains that have flown need not show it.
         bears[np.array(chosen) >= self.drafts.repeats] |= self.flown.flies
         return bears

@@ -49,7 +49,7 @@ class Committee:
         explains: whether the best one explains the runs.
         gusts: disturbances that are known; None: nothing disturbs.
         foretells: whether what it foretold last came true.
-        endings: the best one where what states do ends where flights have been.
+        ending: the best one where what states do ends where flights have been; None where that is not asked.
     """
 
     members: Sequence[_core.Model]
@@ -60,7 +60,7 @@ class Committee:
     gusts: Gusts | None = None
     tuned_delayed: Sequence[_core.Model] = ()
     foretells: bool = False
-    endings: Sequence[_core.Model] = ()
+    ending: _core.Model | None = None
 
     @property
     def predicts_limits(self) -> bool:

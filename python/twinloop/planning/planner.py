@@ -15,7 +15,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Purpose
 from twinloop.controllers import Family
-from twinloop.planning.beyond import bears_endings
+from twinloop.planning.beyond import bears_ending
 from twinloop.planning.candidates import candidates, directions_of, unknown_excitation
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, swing_of
@@ -159,7 +159,7 @@ class Planner(Judge):
         one, options = genes[np.newaxis], self.options
         usage = self.judge(committee.members, one, committee.sds, 1).worst_usage
         reach = reach_of(flown, Wanted("control", 0, exploit=True, last=True), options)
-        return bool((usage <= reach).all() and bears_endings(self, committee, options.margin, one).all())
+        return bool((usage <= reach).all() and bears_ending(self, committee, options.margin, one).all())
 
     # Proposing
 

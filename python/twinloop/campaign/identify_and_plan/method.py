@@ -31,7 +31,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
-from twinloop.law.ending import endings
+from twinloop.law.ending import ending
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -327,17 +327,17 @@ class IdentifyAndPlan:
             self._gusts(latest, len(book.experiments)),
             slower(TUNED_WITH) if true else borne,
             latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
-            self._endings(latest, book),
+            self._ending(latest, book),
         )
 
-    def _endings(self, latest: Learnt, book: Logbook) -> list[_core.Model]:
+    def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
         """The best law where what states do ends where flights and the task have been; none after a first flight.
 
         That one is gentle: gains that do better lead where it has not been.
         """
         if not self.options.ends or len(book.experiments) < 2:
-            return []
-        return endings(latest.believed[0], self.setup.signals, self._seen(book).both)
+            return None
+        return ending(latest.believed[0], self.setup.signals, self._seen(book).both)
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
         """Disturbances that are known, drawn once for each lesson; none that are known to be a model error."""
