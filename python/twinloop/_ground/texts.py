@@ -82,5 +82,5 @@ def in_unit(text: str, unit: str) -> str:
 
 
 def two_digits(value: float) -> str:
-    """A number of which two digits count, such as "0.012" or "120"; never "1.2e+02"."""
+    """A number of which two digits count, such as "0.012", or "120" and not "1.2e+02"."""
     return f"{float(f'{value:.2g}'):g}"

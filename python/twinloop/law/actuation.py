@@ -236,11 +236,34 @@ def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core
         actuator._replace(delay=actuator.delay + whole, lag=actuator.lag + lag)
         for actuator in actuation.actuators
     ]
-    slower = _core.Model(
-        model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets
+    return renewed(model, signals, actuators=late)
+
+
+def renewed(
+    model: _core.Model,
+    signals: Signals,
+    *,
+    program: _core.Program | None = None,
+    actuators: Sequence[Actuator] | None = None,
+) -> _core.Model:
+    """The same model with another program or other actuators, sent to and read as before.
+
+    Args:
+        model: of these signals.
+        signals: of the system.
+        program: of as many inputs and outputs; None: its own.
+        actuators: one a command; None: its own.
+    """
+    found = _core.Model(
+        model.program if program is None else program,
+        model.form,
+        signals.engine,
+        actuators or model.actuators or None,
+        model.hidden,
+        model.offsets,
     )
-    slower = slower.with_levels(model.levels) if model.levels else slower
-    return with_reports(slower, reports_of(model, signals.n_x))
+    found = found.with_levels(model.levels) if model.levels else found
+    return with_reports(found, reports_of(model, signals.n_x))
 
 
 def _check_actuator(actuator: Actuator, where: str) -> None:

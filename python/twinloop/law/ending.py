@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.law.reports import reports_of, with_reports
+from twinloop.law.actuation import renewed
 from twinloop.signals import Signals
 
 
@@ -31,13 +31,5 @@ def ending(model: _core.Model, signals: Signals, bounds: Floats) -> _core.Model:
         if state.period is None
         for instruction in (("min", i, i, high[i]), ("max", i, i, low[i]))
     ]
-    found = _core.Model(
-        _core.Program(program.inputs, program.outputs, program.registers, [[*first, *program.instructions]]),
-        model.form,
-        signals.engine,
-        model.actuators or None,
-        model.hidden,
-        model.offsets,
-    )
-    found = found.with_levels(model.levels) if model.levels else found
-    return with_reports(found, reports_of(model, signals.n_x))
+    cut = _core.Program(program.inputs, program.outputs, program.registers, [[*first, *program.instructions]])
+    return renewed(model, signals, program=cut)

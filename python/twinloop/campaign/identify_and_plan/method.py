@@ -269,9 +269,10 @@ class IdentifyAndPlan:
 
         So they may as long as no prediction has come true, and where they lead further than flights have.
         """
+        if not committee.predicts_limits:
+            return tuned
         flown = self._flown(book, standing.best_flown(book), tuned)
-        near = flown.seen is None and self.planner.is_near(committee, tuned, flown)
-        if near or not committee.predicts_limits:
+        if flown.seen is None and self.planner.is_near(committee, tuned, flown):
             return tuned
         goal, number = self.setup.goal, len(book.tests)
         found = self.planner.propose(committee, tuned, flown, goal, number, exploit=True, last=True)

@@ -24,7 +24,7 @@ from twinloop.faces.report.source import OWN, Source
 from twinloop.faces.report.tables import controller as of_controller
 from twinloop.faces.report.tables import flights as of_flights
 from twinloop.faces.report.tables import twin as of_twin
-from twinloop.faces.report.tables.table import Table
+from twinloop.faces.report.tables.table import Table, shown_spread
 from twinloop.faces.report.verdict import evidence, verdict
 from twinloop.faces.result import summary
 from twinloop.faces.text.controller import advice_words
@@ -121,6 +121,7 @@ def report_page(
         ),
         next=_next(campaign, result),
         risk=partial(risk_words, bounded=is_bounded(found.signals)),
+        spread=shown_spread,
         failures=campaign.failures,
         withdrawals=campaign.withdrawals,
         sessions=sessions,
