@@ -392,6 +392,24 @@ def test_changed_gains_of_the_first_test_are_refused(folder, value):
     assert run("ask", "rig.db").exit_code == 0
 
 
+def test_a_first_test_that_failed_or_was_abandoned_gives_way_to_other_gains(folder):
+    run("ask", "rig.db")
+    assert run("abandon", "rig.db", "0").exit_code == 0
+    assert "TEST 1" in run("ask", "rig.db").stdout, "not the one that is not to be flown"
+    assert run("tell", "rig.db", "1", "--failed", "gearbox broken").exit_code == 0
+    refused = run("ask", "rig.db")
+    assert refused.exit_code == 2 and "found those of test 1 (gearbox broken)" in refused.stderr
+    file = folder / "rig.toml"
+    before = file.read_text(encoding="utf-8")
+    file.write_text(before.replace('"angle.kp" = 2.0', '"angle.kp" = 1.5'), encoding="utf-8")
+    assert "TEST 2" in run("ask", "rig.db").stdout
+    (*_, test) = look().tests
+    assert test.parameters["angle.kp"] == 1.5
+    flown(test)
+    assert run("tell", "rig.db", "2", "flight.csv").exit_code == 0
+    assert "TEST 3" in run("ask", "rig.db").stdout and look().trusted.number == 2
+
+
 def test_another_duration_is_named_as_the_file_does(folder):
     run("ask", "rig.db")
     file = folder / "rig.toml"

@@ -1,6 +1,7 @@
 """A test as an autopilot takes it: gains, commands over time, and a chirp where the test asks for one."""
 
 import csv
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -109,3 +110,36 @@ def test_without_an_autopilot_there_is_the_table_of_commands(kept, tmp_path):
     assert done.exit_code == 0
     assert [path.name for path in (tmp_path / "sheet").iterdir()] == ["test-2-commands.csv"]
     assert CliRunner().invoke(main, ["settings", "nowhere.db", "0", "-o", "x"]).exit_code == 2
+
+
+def test_only_gains_that_are_known_to_fly_are_gone_back_to(tmp_path):
+    """Before any flight, those of the test that waits; then the first one that flew to its end, and no failed one."""
+    pytest.importorskip("sqlalchemy")
+    store, folder = tmp_path / "rig.db", tmp_path / "sheet"
+    restore = folder / "restore.param"
+    rig = tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=PENDULUM_GAINS)
+
+    def entered(change):
+        with closing(
+            tl.Campaign(
+                SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0,
+                threads=1, options=SMALL, store=store,
+            )
+        ) as campaign:  # fmt: skip
+            return change(campaign)
+
+    def told(campaign):
+        test = campaign.test({**PENDULUM_GAINS, "angle.kp": 1.5})
+        campaign.tell(test, rig.run(test))
+
+    entered(lambda campaign: campaign.abandon(campaign.test({**PENDULUM_GAINS, "angle.kp": 5.0})))
+    entered(lambda campaign: campaign.test({**PENDULUM_GAINS, "angle.kp": 4.0}))
+    assert settings(store, 1, folder).exit_code == 0
+    assert float(rows(restore)["ATC_ANG_PIT_P"]) == 4.0
+    entered(lambda campaign: campaign.tell_failed(campaign.tests[1], "gearbox broken"))
+    done = settings(store, 1, folder)
+    assert done.exit_code == 0 and "no test is known to fly" in done.stdout and not restore.exists()
+    entered(told)
+    assert settings(store, 1, folder).exit_code == 0
+    assert float(rows(restore)["ATC_ANG_PIT_P"]) == 1.5
+    assert entered(lambda campaign: campaign.certificate().old.number) == 2

@@ -581,6 +581,21 @@ def test_a_campaign_flies_a_guarded_system_and_learns_from_what_was_ended():
     assert "left its envelope" in run.trajectory.reason
 
 
+def test_gains_that_failed_are_never_fallen_back_on():
+    campaign, rigged = new_campaign(), rig()
+    bad = campaign.test(WILD, excitation=None)
+    assert campaign.guard(bad, horizon=0.0).fallback.parameters == bad.parameters, "nothing has flown yet"
+    campaign.tell_failed(bad, "gearbox broken")
+    good = campaign.test(GOOD, excitation=None)
+    assert campaign.trusted is None
+    with pytest.raises(tl.NotAvailable, match="fallback="):
+        campaign.guard(good, horizon=0.0)
+    assert campaign.guard(good, bad.parameters, horizon=0.0).fallback.parameters == bad.parameters, "as asked"
+    campaign.tell(good, rigged.run(good))
+    assert campaign.trusted is good
+    assert campaign.guard(bad, horizon=0.0).fallback.parameters == good.parameters
+
+
 class OwnLoop(tl.System):
     """Closes its loop by hand; what it is asked to do besides is its matter."""
 

@@ -394,7 +394,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         Args:
             test: that is flown.
             fallback: gains by name; or a command that is safe to hold (n_u,), in its units. None: the first controller
-                that was flown, or, before any was, the test's own without its excitation.
+                that is known to fly (`trusted`), or, before any has flown, the test's own without its excitation.
             horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
             false_alarms: share of flights that the check of the band may end without cause, by the committee's own
                 prediction.
@@ -406,7 +406,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Raises:
             InvalidInput: a test for other signals, or arguments that do not fit.
-            NotAvailable: controllers in Python, whose memory cannot be predicted; pass horizon=0.
+            NotAvailable: controllers in Python, whose memory cannot be predicted; pass horizon=0. Or tests were flown
+                and none of them is known to fly; pass a fallback.
         """
         return guard_of(
             self, test, fallback, horizon=horizon, false_alarms=false_alarms, overrun=overrun, clock=clock
@@ -626,6 +627,14 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def waiting(self) -> tuple[Test, ...]:
         """Tests from `ask` that wait for their run: neither told nor abandoned, in order."""
         return tuple(self._book.waiting())
+
+    @property
+    def trusted(self) -> Test | None:
+        """The first test known to fly: all its runs ended inside the envelope, and none has failed. None: no test is.
+
+        Its gains are those to go back to.
+        """
+        return standing.trusted(self._book)
 
     @property
     def runs(self) -> int:

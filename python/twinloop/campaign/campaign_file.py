@@ -165,7 +165,9 @@ class CampaignFile:
 
     def _check_first(self, campaign: Campaign) -> None:
         """Refuses other gains than those of the first test that was made; what a system says of them nobody typed."""
-        made = next(iter(campaign.tests), None)
+        # One that failed or was abandoned waits for gains of another controller.
+        gone = ("failed", "abandoned")
+        made = next((test for test in campaign.tests if campaign.status(test) not in gone), None)
         if made is None or made.reason or made.predicted is not None or self.made is not None:
             return  # the first test may be one that was planned from attached flights
         differ = differences({"first": made.parameters}, {"first": {**campaign.family.fixed, **self.first}})

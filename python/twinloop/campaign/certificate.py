@@ -50,7 +50,7 @@ class Certificate:
         checks: all of the campaign.
         law_gains: of the controllers, with units and bounds.
         best: the controller to fly; None if there is none.
-        old: the first controller, to return to; None if none was flown.
+        old: the first controller that is known to fly, to return to; None if none is.
         experiments: that it was judged on.
         members: models of the committee.
         margins: of its loops; None if they cannot be computed, or if the twin does not follow its flights.
@@ -106,7 +106,7 @@ def certificate(campaign: Campaign) -> Certificate:
         checks=checks(found),
         law_gains=tuple(campaign.family.law_gains),
         best=best,
-        old=next((run.test for run in found.experiments if run.test is not None), None),
+        old=campaign.trusted,
         experiments=found.experiments,
         members=len(twin.members),
         margins=margins,

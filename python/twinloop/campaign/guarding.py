@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from twinloop.controllers import Controller
+from twinloop.errors import NotAvailable
 from twinloop.guard import Guard
 from twinloop.test import Test, check_signals
 
@@ -31,7 +32,7 @@ def guard_of(
     twin = campaign.twin if campaign.experiments else None
     return Guard(
         test,
-        _instead(campaign, flown[0][0] if flown else test, fallback),
+        _instead(campaign, test, fallback),
         twin=None if twin is None or not twin.follows else twin,
         flown=flown,
         horizon=horizon,
@@ -43,11 +44,24 @@ def guard_of(
 
 
 def _instead(
-    campaign: Campaign, trusted: Test, fallback: Mapping[str, float] | ArrayLike | None
+    campaign: Campaign, test: Test, fallback: Mapping[str, float] | ArrayLike | None
 ) -> Controller | ArrayLike:
-    """What commands once the guard has tripped: gains by name, a held command, or the controller of a trusted test."""
+    """What commands once the guard has tripped: gains by name, a held command, or the controller that is trusted."""
     if fallback is None:
-        return campaign.family.controller(trusted.genes)
+        return campaign.family.controller(_trusted(campaign, test).genes)
     if isinstance(fallback, Mapping):
         return campaign.family.controller(campaign.family.genes(fallback))
     return fallback
+
+
+def _trusted(campaign: Campaign, test: Test) -> Test:
+    """The first test that is known to fly; before any has flown, the one that is flown now, without its excitation."""
+    known = campaign.trusted
+    if known is not None:
+        return known
+    if campaign.failures or any(run.test is not None for run in campaign.experiments):
+        raise NotAvailable(
+            "Guard: expected a test that has flown to its end inside the envelope, to fall back on, found none; name"
+            " gains or a command that are safe: fallback=."
+        )
+    return test

@@ -80,6 +80,16 @@ def first_flown(book: Logbook) -> Test | None:
     return next((run.test for run in book.experiments if run.test is not None), None)
 
 
+def trusted(book: Logbook) -> Test | None:
+    """The first test that is known to fly, whose gains a person can go back to; None where none is.
+
+    Args:
+        book: of the campaign.
+    """
+    flown = (run.test for run in book.experiments if run.test is not None)
+    return next((test for test in flown if flies(book, test.number)), None)
+
+
 def flies(book: Logbook, test: int) -> bool:
     """Whether a test is known to fly: each of its runs went to its end inside the envelope.
 

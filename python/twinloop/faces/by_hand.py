@@ -64,8 +64,9 @@ def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | N
     with closing(_campaign(store, threads)) as campaign:
         waiting = campaign.waiting
         # Whatever was attached: the first test is the controller that is trusted.
-        if all(run.attached for run in campaign.experiments) and not campaign.failures:
-            test = next(iter(campaign.tests), None) or _first(store, campaign)
+        if all(run.attached for run in campaign.experiments):
+            made = (test for test in campaign.tests if campaign.status(test) == "asked")
+            test = next(made, None) or _first(store, campaign)
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
         text, described = _shown(store, campaign, test)
@@ -278,4 +279,11 @@ def _first(store: str, campaign: Campaign) -> Test:
             f"ask: expected the gains of the first test in {where}, found no such file; add it."
         )
     with at(f"Campaign file {file}, [first]"):
-        return campaign.test(dict(read_file(file).first))
+        first = campaign.family.genes(dict(read_file(file).first))
+        for failure in campaign.failures:
+            if failure.test.genes.tobytes() == first.tobytes():
+                raise InvalidInput(
+                    f"expected gains that have not failed, found those of test {failure.test.number}"
+                    f" ({failure.reason}); write those of another controller that you trust."
+                )
+        return campaign.test(first)

@@ -72,8 +72,8 @@ def _parameter_files(found: Certificate, autopilot: Autopilot | None) -> dict[st
         return {}
     if found.old is None:
         raise InvalidInput(
-            "certify: expected a flight under gains that can be restored, found none; tell one, or leave"
-            " --autopilot out."
+            "certify: expected a flight that went to its end inside the envelope, whose gains can be restored, found"
+            " none; tell one, or leave --autopilot out."
         )
     suffix = autopilot.suffix
     return {

@@ -36,9 +36,9 @@ def settings(
 ) -> None:
     """Write a TEST of STORE as settings: gains, commands over time and, where it can be, a chirp.
 
-    Writes test-N-commands.csv into FOLDER and, with --autopilot, first restore.* with the gains of the first test, then
-    test-N.* with those of this one, and test-N-sweep.* where its excitation is the declared sweep of ArduPilot or
-    Betaflight; where it is not, a sentence says why.
+    Writes test-N-commands.csv into FOLDER and, with --autopilot, first restore.* with the gains of the first test known
+    to fly, then test-N.* with those of this one, and test-N-sweep.* where its excitation is the declared sweep of
+    ArduPilot or Betaflight; where it is not, a sentence says why.
     """
     given = prepared(store, name, kind, mapping)
     campaign, declared, autopilot = given.campaign, given.declared, given.autopilot
@@ -46,8 +46,14 @@ def settings(
     texts: dict[str, str] = {}
     said = ""
     if autopilot is not None and declared is not None:
-        old = campaign.tests[0].parameters
-        texts[f"restore{autopilot.suffix}"] = autopilot.text(old, "The gains of test 0: load to go back.")
+        old, restore = _to_go_back_to(campaign), f"restore{autopilot.suffix}"
+        if old is None:
+            # One of an earlier time would hold gains that have failed since.
+            (output / restore).unlink(missing_ok=True)
+            said = "No restore file: no test is known to fly; keep the gains that the vehicle has now."
+        else:
+            whose = f"The gains of test {old.number}: load to go back."
+            texts[restore] = autopilot.text(old.parameters, whose)
         texts[f"test-{test}{autopilot.suffix}"] = autopilot.text(
             asked.parameters, f"The gains of test {test}."
         )
@@ -55,10 +61,10 @@ def settings(
             try:
                 texts[f"test-{test}-sweep{autopilot.suffix}"] = declared.sweep.settings(autopilot.kind, asked)
             except NotAvailable as reason:
-                said = str(reason)
+                said = f"{said} {reason}"
         elif asked.excitation is not None:
-            said = (
-                f"Chirp settings: expected [autopilot.sweep] and one of {', '.join(AXES)}, which sweep one axis by"
+            said += (
+                f" Chirp settings: expected [autopilot.sweep] and one of {', '.join(AXES)}, which sweep one axis by"
                 " themselves; send the table of commands."
             )
     if asked.excitation is not None and asked.hold_back is not None:
@@ -74,6 +80,15 @@ def settings(
     written = [str(output / file) for file in [*texts, table.name]]
     text = f"Wrote {', '.join(written)}." + (f" {said.strip()}" if said else "")
     answer({"files": written, "note": said.strip()}, text, as_json)
+
+
+def _to_go_back_to(campaign: Campaign) -> Test | None:
+    """The first test that is known to fly; before any was told of, the first one that waits."""
+    told = campaign.failures or any(run.test is not None for run in campaign.experiments)
+    waits = (
+        None if told else next((test for test in campaign.tests if campaign.status(test) == "asked"), None)
+    )
+    return campaign.trusted or waits
 
 
 def _columns(campaign: Campaign, test: Test) -> dict[str, Floats]:
