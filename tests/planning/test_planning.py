@@ -396,6 +396,16 @@ def test_where_the_tuned_gains_may_not_be_flown_the_last_test_is_the_best_of_the
     )
 
 
+def test_the_last_test_has_no_excitation_either_where_the_twin_does_not_follow():
+    known = signals()
+    planner, committee = planner_of(known), replace(committee_of(known), trusted=False)
+    before = proposed(planner, committee)
+    assert same_bits(before.genes, TUNED) and before.excitation is not None
+    found = proposed(planner, committee, exploit=True, last=True)
+    assert same_bits(found.genes, TUNED) and found.excitation is None
+    assert found.reason.startswith("The best gains flown, again: they are known to fly.")
+
+
 def test_a_committee_of_one_agrees_and_a_member_that_diverges_is_no_reason_to_crash():
     known = signals()
     planner = planner_of(known)

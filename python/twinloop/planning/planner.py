@@ -229,7 +229,8 @@ class Planner(Judge):
         if self.options.within and committee.predicts_limits and found.possible[0] and not found.keeps[0]:
             found = self._within(found)
         proposal = found.proposal()
-        if last and not found.wanted.plain and proposal.genes.tobytes() != tuned.tobytes():
+        as_wanted = proposal.excitation is None and proposal.genes.tobytes() == tuned.tobytes()
+        if last and not found.wanted.plain and not as_wanted:
             return self._compared(committee, tuned, flown, replace(wanted, plain=True)).proposal()
         return proposal
 

@@ -50,6 +50,8 @@ NEAR = 2
 """Single states, the best ones, beside which another source is tried."""
 FEW = 2
 """Kinds of storage that are followed up where they are looked for as if nothing disturbed."""
+FITTED = 3
+"""Kinds of storage that are fitted, the likeliest ones: to tune a law on its predictions is dearer than to search it."""
 AT_ONCE = 24
 """Hidden states of which inner products are computed at once."""
 STORED = 50
@@ -90,7 +92,8 @@ def _told(context: Context, bare: Hypothesis, brief: bool = False) -> Iterator[H
     """
     screens = [Screen.of(context, variant) for variant in (bare, *at_once(context, bare))]
     for screen in screens:
-        for found in filled_by_motion(screen, brief):
+        likeliest = sorted(filled_by_motion(screen, brief), key=lambda one: one.evidence.length)[:FITTED]
+        for found in likeliest:
             # What is stored in place of a lag describes more than the lag alone, or all that is fitted is in vain.
             if screen is not screens[0] and not found.evidence > screens[0].plain.evidence:
                 continue
