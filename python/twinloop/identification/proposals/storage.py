@@ -50,8 +50,6 @@ NEAR = 2
 """Single states, the best ones, beside which another source is tried."""
 FEW = 2
 """Kinds of storage that are followed up where they are looked for as if nothing disturbed."""
-FITTED = 3
-"""Kinds of storage that are fitted, the likeliest ones: to tune a law on its predictions is dearer than to search it."""
 AT_ONCE = 24
 """Hidden states of which inner products are computed at once."""
 STORED = 50
@@ -92,8 +90,7 @@ def _told(context: Context, bare: Hypothesis, brief: bool = False) -> Iterator[H
     """
     screens = [Screen.of(context, variant) for variant in (bare, *at_once(context, bare))]
     for screen in screens:
-        likeliest = sorted(filled_by_motion(screen, brief), key=lambda one: one.evidence.length)[:FITTED]
-        for found in likeliest:
+        for found in filled_by_motion(screen, brief):
             # What is stored in place of a lag describes more than the lag alone, or all that is fitted is in vain.
             if screen is not screens[0] and not found.evidence > screens[0].plain.evidence:
                 continue
@@ -119,8 +116,7 @@ def shows(hidden: Sequence[HiddenState], period: float) -> bool:
 def filled_by_motion(screen: Screen, brief: bool = False) -> Iterator[Hypothesis]:
     """The hypothesis of a screen, not fitted, with the best storage of each kind; none that does not pay at all.
 
-    Kinds are what one state fills, empty or settled at the start, and pairs of each time that is tried. A pair
-    describes what is linear whatever its time, which predictions alone tell.
+    Kinds are what one state fills, empty or settled at the start, what two fill, and pairs that turn into each other.
 
     Args:
         screen: of a hypothesis with sums to begin with, and without such states.
@@ -138,17 +134,16 @@ def filled_by_motion(screen: Screen, brief: bool = False) -> Iterator[Hypothesis
     others = [one.actuation.hidden[0].states[0] for one in near]
     kinds: list[tuple[Screen, list[Hypothesis], Sequence[float]]]
     kinds = [(screen, found, FINER) for found in singles.values()]
-    for time in times:
-        pairs = screen(pair for one in near for pair in _pairs(context, one, others, time))
-        kinds.append((screen, pairs, ()))
+    pairs = screen(pair for time in times for one in near for pair in _pairs(context, one, others, time))
+    kinds.append((screen, pairs, ()))
     swings = screen.beside()
-    for begins in (False, True) if not brief else ():
-        swinging = swings(
-            pair
-            for place in _sources(context)
-            for pair in _swinging(place, begins, longest, context.signals.dt)
-        )
-        kinds.append((swings, swinging, FINER_SWINGS))
+    swinging = (
+        pair
+        for begins in (False, True)
+        for place in _sources(context)
+        for pair in _swinging(place, begins, longest, context.signals.dt)
+    )
+    kinds.append((swings, [] if brief else swings(swinging), FINER_SWINGS))
     showing = [
         (of_kind, found, factors)
         for of_kind, found, factors in (
