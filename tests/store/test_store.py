@@ -568,6 +568,50 @@ def test_a_store_that_may_not_be_written_is_said(pendulum):
             stored(path)
 
 
+@contextmanager
+def on_a_still_medium(*files):
+    """Copies of files, the store first, in a folder in which this process may not write."""
+    with TemporaryDirectory() as folder:
+        copies = [Path(shutil.copy(file, folder)) for file in files]
+        for copy in copies:
+            copy.chmod(0o444)
+        Path(folder).chmod(0o555)
+        try:
+            with not_root():
+                yield copies[0]
+        finally:
+            Path(folder).chmod(0o755)
+
+
+def test_a_store_on_a_medium_that_cannot_be_written_is_read(path, pendulum):
+    flown(stored(path), pendulum).close()
+    with on_a_still_medium(path) as copy:
+        assert len(tl.Campaign.load(copy, read_only=True).experiments) == 1
+
+
+def test_commits_that_are_still_in_the_log_are_never_left_out(path, pendulum):
+    """Without the right to write in its folder SQLite cannot read them: the last flights would be missing."""
+    flown(stored(path), pendulum).close()
+    campaign = tl.Campaign.load(path)
+    campaign.tell(campaign.tests[0], pendulum.run(campaign.tests[0]))
+    log = path.with_name(f"{path.name}-wal")
+    with (
+        on_a_still_medium(path, log) as copy,
+        pytest.raises(tl.StoreFailure, match=r"hover\.db-wal needs, found none; .* copy both files"),
+    ):
+        tl.Campaign.load(copy, read_only=True)
+
+
+def test_a_store_that_another_program_holds_is_not_read_past_it(path, pendulum, monkeypatch):
+    monkeypatch.setattr("twinloop.store.database.BUSY_SECONDS", 0.0)
+    flown(stored(path), pendulum).close()
+    with closing(sqlite3.connect(path, isolation_level=None)) as other:
+        other.execute("PRAGMA journal_mode = DELETE")
+        other.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(tl.StoreFailure, match="a turn to write"):
+            tl.Campaign.load(path, read_only=True)
+
+
 def test_a_store_that_becomes_read_only_is_said_and_loses_nothing(path, pendulum):
     campaign = stored(path)
     first = campaign.test(pendulum.default_gains)

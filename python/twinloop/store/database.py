@@ -263,7 +263,19 @@ def _check_whole(store: Store) -> None:
 
 
 def _from_still_medium(path: Path, refusal: TwinloopError) -> Store:
-    """A store where not even SQLite's own marks can be made, such as on a mounted image; else the refusal again."""
+    """A store where not even SQLite's own marks can be made, such as on a mounted image; else the refusal again.
+
+    What is opened as immutable is read without its log of commits, and while others may write it.
+    """
+    if "locked" in str(refusal.__cause__):
+        raise refusal
+    log = path.resolve().with_name(f"{path.resolve().name}-wal")
+    if log.exists() and log.stat().st_size > 0:
+        raise StoreFailure(
+            f"Store {path}: expected the right to write in its folder, which reading the commits of {log.name} needs,"
+            " found none; nothing is lost: give that right, or copy both files into a folder of yours and read them"
+            " there."
+        ) from refusal
     store = _connected(str(path), path, read_only=True, immutable=True)
     try:
         with store.sentences():
