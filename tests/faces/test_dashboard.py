@@ -279,3 +279,8 @@ def test_only_one_long_thing_goes_on_at_a_time(store, monkeypatch):
             break
         time.sleep(0.05)
     table.abandon("campaign", 1)
+
+
+def test_the_pages_of_a_server_are_headed_without_its_password(monkeypatch):
+    monkeypatch.setattr(desk, "opened", lambda _: contextlib.ExitStack())  # something to be closed
+    assert desk.Desk("postgresql://me:s3cret@h").title == "postgresql://me:***@h"

@@ -100,3 +100,12 @@ def test_an_interruption_says_how_to_go_on(store, monkeypatch):
     resumed = run("resume", store, "--json")
     same_but_for_run_info(resumed.stdout, run(*SMALL, "--experiments", "2", "--json").stdout)
     assert invoke("show", store).exit_code == 0
+
+
+def test_neither_a_refusal_nor_the_facts_of_a_run_have_the_password_of_a_server(monkeypatch):
+    refused = run("show", "postgres://me:s3cret@h/db")
+    assert refused.exit_code == 2 and "postgres://me:***@h/db" in refused.stderr
+    assert "s3cret" not in refused.stderr
+    monkeypatch.setattr("sys.argv", ["twinloop", "run", "--store=postgresql://me:a/s3cret@h/db"])
+    answer = json.loads(run(*SMALL, "--experiments", "1", "--json").stdout)
+    assert answer["run_info"]["command"][-1] == "--store=postgresql://me:***@h/db"

@@ -246,3 +246,16 @@ def test_ctrl_c_is_one_sentence_and_none_of_the_workers(tmp_path):
     said = process.communicate(timeout=120)[1]
     assert process.returncode == 130
     assert said.startswith("Interrupted: what was finished") and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_no_password_is_printed(monkeypatch, stopped):
+    def flown(jobs, store, cluster):
+        if stopped:
+            raise KeyboardInterrupt
+        return iter(())
+
+    monkeypatch.setattr("twinloop.sweep.command.fly_all", flown)
+    done = invoke("sweep", "quadrotor", "--store", "postgresql://me:s3cret@h/db", "--json")
+    assert done.exit_code == (130 if stopped else 0)
+    assert "postgresql://me:***@h/db" in done.output and "s3cret" not in done.output

@@ -177,7 +177,7 @@ class Keeping:
 
     @property
     def store(self) -> str:
-        """The file, or the address without its password."""
+        """The file, or the address without its passwords."""
         return self._keeper.store.name
 
     @property
@@ -260,9 +260,14 @@ def provenance(threads: int) -> Record:
         "processor": _processor(),
         "vectors": _core.vector_widths(),
         "system": platform.platform(),
-        "command": [whole_characters(shown_name(word)) for word in as_typed(sys.argv)],
+        "command": command_line(),
         "versions": versions(),
     }
+
+
+def command_line() -> list[str]:
+    """The command of this process as a person would type it, without passwords."""
+    return [whole_characters(shown_name(word)) for word in as_typed(sys.argv)]
 
 
 def as_typed(words: Sequence[str]) -> list[str]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import platform
-import sys
 import time
 from datetime import datetime, timezone
 
 from twinloop._ground.versions import versions
-from twinloop.campaign.keeping import as_typed
+from twinloop.campaign.keeping import command_line
 
 
 class Stopwatch:
@@ -31,6 +30,6 @@ class Stopwatch:
             "threads": self.threads,
             "host": platform.node(),
             "machine": platform.machine(),
-            "command": as_typed(sys.argv),
+            "command": command_line(),
             "versions": versions(),
         }

@@ -1,7 +1,8 @@
 """The durable store: campaigns in a database, so that no run is ever lost."""
 
+from twinloop.store.address import is_address, shown_name
 from twinloop.store.approvals import approve, approved
-from twinloop.store.database import Store, is_address, opened, shown_name
+from twinloop.store.database import Store, opened
 from twinloop.store.keeper import Keeper, Stored, begun, found, listed
 from twinloop.store.watching import Doing, doing, state
 

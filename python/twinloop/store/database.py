@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
+from twinloop.store.address import is_address, shown_name
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine
@@ -42,7 +42,7 @@ class Store:
 
     Args:
         engine: of SQLAlchemy.
-        name: of the file, or the address without its password, for errors.
+        name: of the file, or the address without its passwords, for errors.
         path: of the file; None for a server.
         read_only: whether nothing is written.
     """
@@ -120,24 +120,6 @@ def opened(where: str | Path, *, create: bool = False, read_only: bool = False) 
     return store
 
 
-def is_address(where: str | Path) -> bool:
-    """Whether a store is named by the address of a server, and not by a file.
-
-    Args:
-        where: a file, or an address such as "postgresql+psycopg://user@host/database".
-    """
-    return "://" in str(where)
-
-
-def shown_name(where: str | Path) -> str:
-    """What a store may be called where others read it: the file, or the address without its password.
-
-    Args:
-        where: a file, or the address of a server.
-    """
-    return re.sub(r"(://[^/?#:]*):[^/?#]*@", r"\1:***@", str(where)) if is_address(where) else str(where)
-
-
 def require() -> None:
     """Refuses to work without the packages of the extra `store`.
 
@@ -212,20 +194,27 @@ def _connected(text: str, path: Path | None, read_only: bool, immutable: bool = 
     from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
     if path is None:
+        name = shown_name(text)
         try:
             url = make_url(text)
             engine = create_engine(url)
-        except (ArgumentError, NoSuchModuleError) as reason:
+        except (ArgumentError, NoSuchModuleError, ValueError) as reason:
+            # What others say of an address may quote it, with its password.
+            why = f": {reason}" if isinstance(reason, NoSuchModuleError) else ""
             raise InvalidInput(
-                f"Store {text}: expected a file or an address such as postgresql+psycopg://user@host/database, found"
-                f" none: {reason}."
-            ) from reason
+                f"Store {name}: expected a file or an address such as postgresql+psycopg://user@host/database, found"
+                f" none{why}; correct it."
+            ) from None
         except ModuleNotFoundError as missing:
             raise NotAvailable(
                 f"Store: expected the driver of the server, found that {missing.name} is missing; for PostgreSQL,"
                 " install it with: pip install 'twinloop[postgresql]'."
             ) from missing
-        return Store(engine, url.render_as_string(hide_password=True), None, read_only)
+        if "@" in (url.host or ""):
+            raise InvalidInput(
+                f"Store {name}: expected one @, before the host, found several; write one in a password as %40."
+            )
+        return Store(engine, name, None, read_only)
     if read_only:
         query = {"uri": "true", "mode": "ro", **({"immutable": "1"} if immutable else {})}
         url = URL.create("sqlite", database=path.resolve().as_uri().replace("file://", "file:"), query=query)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput
-from twinloop.store import listed, opened
+from twinloop.store import listed, opened, shown_name
 from twinloop.sweep.flying import Flown, begun, fly
 from twinloop.sweep.jobs import Job, system_of
 from twinloop.sweep.workers import HERE, finished, threads_on
@@ -89,13 +89,13 @@ def _stored(job: Job, store: str | Path) -> Campaign | None:
     asked = begun(job, system_of(job.system, job.seed), threads=1).setup.to_record()
     if look(store, job.name, read_only=True).setup != asked:
         raise InvalidInput(
-            f"Sweep, store {store}: expected the campaign {job.name!r} to be of the same setup, found another one;"
-            " choose another store."
+            f"Sweep, store {shown_name(store)}: expected the campaign {job.name!r} to be of the same setup, found"
+            " another one; choose another store."
         )
     campaign = Campaign.load(store, job.name, read_only=True, threads=1, progress=None)
     if len(campaign.experiments) + len(campaign.failures) != job.experiments:
         raise InvalidInput(
-            f"Sweep, store {store}: expected the campaign {job.name!r} with {job.experiments} experiments, found"
-            f" {len(campaign.experiments)}; choose another store."
+            f"Sweep, store {shown_name(store)}: expected the campaign {job.name!r} with {job.experiments} experiments,"
+            f" found {len(campaign.experiments)}; choose another store."
         )
     return campaign

@@ -9,7 +9,7 @@ import click
 
 from twinloop.campaign.presets import PRESETS
 from twinloop.errors import InvalidInput
-from twinloop.store import is_address
+from twinloop.store import is_address, shown_name
 from twinloop.sweep.campaigns import Outcome
 from twinloop.sweep.campaigns import sweep as fly_all
 from twinloop.sweep.jobs import Job, crossed
@@ -68,11 +68,13 @@ def sweep(
         _work(jobs, store, cluster, outcomes)
     except KeyboardInterrupt:
         click.echo(
-            f"Interrupted: what was finished is in {store}; the same command goes on from there.", err=True
+            f"Interrupted: what was finished is in {shown_name(store)}; the same command goes on from there.",
+            err=True,
         )
         context.exit(130)
     rows = summarised(outcomes)
-    click.echo(json.dumps({"store": store, "groups": rows}) if as_json else as_text(rows), nl=as_json)
+    found = {"store": shown_name(store), "groups": rows}
+    click.echo(json.dumps(found) if as_json else as_text(rows), nl=as_json)
     context.exit(1 if any(outcome.failure is not None for outcome in outcomes) else 0)
 
 

@@ -192,7 +192,7 @@ class Pages:
             " base-uri 'none'"
         )
         return HTMLResponse(
-            template.render(sheet=_unescaped(self._style), store=Path(self.desk.store).name, **facts),
+            template.render(sheet=_unescaped(self._style), store=self.desk.title, **facts),
             headers={"content-security-policy": policy},
         )
 
@@ -236,9 +236,7 @@ class Pages:
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test)
         against = serious_of(latest_lesson(campaign))
-        return sheet(
-            Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup, against
-        )
+        return sheet(self.desk.title, test, predicted, f"test-{number}.csv", campaign.setup, against)
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)

@@ -12,7 +12,7 @@ from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
 from twinloop.faces.telling import attach, counted, numbered, tell, tell_failed
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
-from twinloop.store import Doing, approve, approved, doing, listed, opened, state
+from twinloop.store import Doing, approve, approved, doing, is_address, listed, opened, shown_name, state
 from twinloop.test import Test
 
 LOST = 120.0
@@ -40,6 +40,11 @@ class Desk:
         self._failed: dict[str, str] = {}
         with closing(opened(store)):  # an older store is brought up to date, and what is none is refused
             pass
+
+    @property
+    def title(self) -> str:
+        """What pages call the store."""
+        return shown_name(self.store) if is_address(self.store) else Path(self.store).name
 
     def campaigns(self) -> list[dict[str, object]]:
         """Name, when begun, tests and experiments of each campaign."""

@@ -14,7 +14,7 @@ from twinloop.campaign.keeping import as_typed, look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
 from twinloop.records.reading import from_text
-from twinloop.store import Stored, is_address
+from twinloop.store import Stored, is_address, shown_name
 
 LARGEST = 1 << 30
 """Bytes of a record that is read."""
@@ -109,7 +109,7 @@ def _session(found: Mapping[str, Any]) -> dict[str, str]:
     versions = found.get("versions")
     return {
         "begun": str(found.get("started", ""))[:16].replace("T", " "),
-        "command": shlex.join(as_typed([str(word) for word in found.get("command") or ()])),
+        "command": shlex.join(as_typed([shown_name(str(word)) for word in found.get("command") or ()])),
         "versions": ", ".join(f"{k} {v}" for k, v in versions.items())
         if isinstance(versions, Mapping)
         else "",
