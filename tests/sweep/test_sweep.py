@@ -3,12 +3,15 @@
 import json
 import math
 import os
+import shutil
 import signal
+import sqlite3
 import statistics
 import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -87,6 +90,27 @@ def test_another_setup_in_the_store_is_refused(here):
     longer = [Job(job.system, job.preset, job.seed, job.options, 3) for job in small()]
     with pytest.raises(tl.InvalidInput, match="3 experiments, found 2"):
         list(sweep(longer, path))
+
+
+def test_a_finished_campaign_of_an_earlier_version_is_not_flown_again(here, tmp_path, monkeypatch):
+    """It had no option that was added since; the default of that is what it flew with."""
+    path, outcomes = here
+    earlier = shutil.copy(path, tmp_path)
+    with closing(sqlite3.connect(earlier)) as base:
+        for identity, text in base.execute("select id, setup from campaigns").fetchall():
+            setup = json.loads(text)
+            del setup["options"]["mutant_step"]
+            base.execute("update campaigns set setup = ? where id = ?", (json.dumps(setup), identity))
+        base.commit()
+    monkeypatch.setattr("twinloop.sweep.campaigns.fly", lambda *_, **__: pytest.fail("flown again"))
+    assert records(sweep(small(), earlier)) == records(outcomes)
+
+
+def test_a_campaign_of_another_setup_under_the_name_of_a_job_is_refused(here, tmp_path):
+    _, outcomes = here
+    outcomes[0].campaign.save(tmp_path / "other.db", outcomes[1].job.name)
+    with pytest.raises(tl.InvalidInput, match=r"of this sweep, found another: .* in the store, .* now"):
+        list(sweep([outcomes[1].job], tmp_path / "other.db"))
 
 
 def test_a_cluster_gives_the_same_bits_though_a_worker_is_killed(here, tmp_path):

@@ -62,10 +62,9 @@ class Keeping:
         try:
             held = found(store, name)
             assert held is not None  # the keeper has entered it
-            known = Setup.from_record(held.setup).to_record()
-            _check_same(
-                _stated(known),
-                _stated(asked),
+            check_setup(
+                Setup.from_record(held.setup),
+                setup,
                 f"Store {store.name}: expected the campaign {name!r} as it was begun",
             )
             self._keeper.open_session(provenance(threads))
@@ -306,6 +305,20 @@ def _check_name(name: object) -> None:
             f"Campaign, name: expected a text of 1 to 200 characters, found {name!r}; name it."
         )
     text("Campaign, name", name)
+
+
+def check_setup(known: Setup, asked: Setup, what: str) -> None:
+    """Refuses another setup than the one that is known, whatever version wrote it down.
+
+    Args:
+        known: as it was read from a store.
+        asked: that is to go on from there.
+        what: the store, and what was expected there, for errors.
+
+    Raises:
+        InvalidInput: they differ.
+    """
+    _check_same(_stated(known.to_record()), _stated(asked.to_record()), what)
 
 
 def _stated(setup: Record) -> Record:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.keeping import look
+from twinloop.campaign.keeping import check_setup
 from twinloop.errors import InvalidInput
 from twinloop.store import listed, opened, shown_name
 from twinloop.sweep.flying import Flown, begun, fly
@@ -86,16 +86,13 @@ def _finished(store: str | Path) -> set[str]:
 
 def _stored(job: Job, store: str | Path) -> Campaign | None:
     """The campaign that the store holds, if it is finished; one that is not makes room for nothing and is refused."""
-    asked = begun(job, system_of(job.system, job.seed), threads=1).setup.to_record()
-    if look(store, job.name, read_only=True).setup != asked:
-        raise InvalidInput(
-            f"Sweep, store {shown_name(store)}: expected the campaign {job.name!r} to be of the same setup, found"
-            " another one; choose another store."
-        )
+    asked = begun(job, system_of(job.system, job.seed), threads=1)
     campaign = Campaign.load(store, job.name, read_only=True, threads=1, progress=None)
+    where = f"Sweep, store {shown_name(store)}"
+    check_setup(campaign.setup, asked.setup, f"{where}: expected the campaign {job.name!r} of this sweep")
     if len(campaign.experiments) + len(campaign.failures) != job.experiments:
         raise InvalidInput(
-            f"Sweep, store {shown_name(store)}: expected the campaign {job.name!r} with {job.experiments} experiments,"
-            f" found {len(campaign.experiments)}; choose another store."
+            f"{where}: expected the campaign {job.name!r} with {job.experiments} experiments, found"
+            f" {len(campaign.experiments)}; choose another store."
         )
     return campaign
