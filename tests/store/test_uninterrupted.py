@@ -55,6 +55,32 @@ def test_the_handler_of_a_program_is_held_back_too():
         signal.signal(signal.SIGTERM, before)
 
 
+def test_a_handler_that_raises_does_not_swallow_the_signals_behind_it():
+    seen = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: seen.append(number))
+    try:
+        with pytest.raises(KeyboardInterrupt), uninterrupted():
+            interrupt()
+            signal.raise_signal(signal.SIGTERM)
+        assert seen == [signal.SIGTERM] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_signals_are_handled_in_the_order_in_which_they_came():
+    seen = []
+    numbers = (signal.SIGUSR2, signal.SIGTERM, signal.SIGUSR1)
+    before = {each: signal.signal(each, lambda number, frame: seen.append(number)) for each in numbers}
+    try:
+        with uninterrupted():
+            for each in numbers:
+                signal.raise_signal(each)
+        assert seen == list(numbers)
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
 def test_another_thread_holds_nothing_back():
     """Python refuses to change handlers there."""
     done = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
@@ -35,7 +35,17 @@ def uninterrupted() -> Iterator[None]:
         yield
     finally:
         over = True
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        for late in came:
-            signal.raise_signal(late)
+        try:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+        finally:
+            _handle_all(came)
+
+
+def _handle_all(numbers: Sequence[int]) -> None:
+    """Handles signals one after another, also those behind one whose handler raises."""
+    if numbers:
+        try:
+            signal.raise_signal(numbers[0])
+        finally:
+            _handle_all(numbers[1:])
