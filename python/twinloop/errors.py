@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
 __all__ = [
     "InvalidInput",
@@ -111,22 +110,6 @@ def at(where: str, lines: Sequence[int] | None = None) -> Iterator[None]:
         yield
     except InvalidInput as reason:
         raise InvalidInput(f"{where}: {in_file(reason, lines)}") from reason
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Names the file that cannot be written: of a full disk the system names none, of a draft one that nobody knows.
-
-    Args:
-        path: of the file.
-
-    Raises:
-        OSError: as inside, with the path.
-    """
-    try:
-        yield
-    except OSError as refusal:
-        raise OSError(refusal.errno, refusal.strerror, str(path)) from refusal
 
 
 def in_file(reason: InvalidInput, lines: Sequence[int] | None) -> str:

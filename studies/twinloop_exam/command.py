@@ -12,9 +12,9 @@ from pathlib import Path
 import click
 
 from twinloop._ground.arrays import whole
+from twinloop._ground.writing import write_whole
 from twinloop.campaign.remaining import duration
 from twinloop.errors import NotAvailable, unknown
-from twinloop.faces.files import write_text
 from twinloop.faces.result import to_json
 from twinloop.sweep.seeds import seeds_of
 from twinloop.sweep.workers import HERE, processes
@@ -125,7 +125,7 @@ def power(
             if page is None:
                 click.echo(render(results, "json" if as_json else form or "text"), nl=False)
             else:
-                write_text(page, as_page(results, kept.versions))
+                write_whole(page, as_page(results, kept.versions))
                 if as_json:
                     click.echo(to_json({"files": [str(page)]}), nl=False)
         finally:

@@ -168,7 +168,7 @@ def test_a_mapping_that_cannot_be_used_writes_nothing(flown, tmp_path, mapping, 
 
 def test_the_restore_file_is_written_first(flown, tmp_path, monkeypatch):
     written = []
-    monkeypatch.setattr("twinloop.faces.certifying.write_text", lambda path, text: written.append(path.name))
+    monkeypatch.setattr("twinloop.faces.certifying.write_whole", lambda path, text: written.append(path.name))
     certify(flown[1], tmp_path, "--autopilot", "ros2", mapping=MAPPING.replace("MC_", "mc."))
     assert written[:2] == ["restore.yaml", "gains.yaml"]
 

@@ -389,7 +389,7 @@ def test_a_file_that_a_full_disk_refuses_is_named(monkeypatch, tmp_path):
     def full(*arguments, **options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr("os.fsync", full)
     file = tmp_path / "my rig.toml"
     done = invoke("new", str(file))
     assert done.exit_code == 1 and f"No space left on device: {str(file)!r}" in done.stderr
@@ -402,7 +402,7 @@ def test_a_result_that_cannot_be_written_is_printed(monkeypatch, tmp_path):
     def full(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("twinloop.faces.working.write_text", full)
+    monkeypatch.setattr("twinloop.faces.working.write_whole", full)
     done = invoke(*TINY, "--json", "--output", str(tmp_path / "result.json"))
     assert done.exit_code == 1 and "No space left" in done.stderr
     assert len(json.loads(done.stdout)["experiments"]) == 1

@@ -15,7 +15,7 @@ MODULES = {
 # A file that is added here may be imported from outside its room; a file that no one imports any more leaves the list.
 FRONTS = {
     "_experiment": "envelope hold_back limits replay",
-    "_ground": "arrays elementary loading rounding showing slopes steps streams texts times values versions",
+    "_ground": "arrays elementary loading rounding showing slopes steps streams texts times values versions writing",
     "autopilots": "declared files sweep",
     "campaign": "assessment campaign_file certificate cost from_logs history keeping presets remaining setup",
     "campaign/coevolution": "method search",

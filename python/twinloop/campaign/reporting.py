@@ -6,6 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from twinloop._ground.writing import write_whole
+
 if TYPE_CHECKING:
     from twinloop.campaign.campaign import Campaign
     from twinloop.faces.figures.plots import Plots
@@ -16,10 +18,10 @@ def reported(campaign: Campaign, to: str | Path | None, name: str) -> str:
     if to is None:
         text: str = _face("text").render(_face("result").summary(campaign, {"name": name}, {}))
         return text
-    files, path = _face("files"), Path(to)
-    files.check_writable(path, [".html"])
+    path = Path(to)
+    _face("files").check_writable(path, [".html"])
     page: str = _face("report.page").report_page(campaign, name, {"name": name}, {})
-    files.write_text(path, page)
+    write_whole(path, page)
     return page
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from twinloop._ground.texts import to_type
+from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
@@ -17,7 +18,7 @@ from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.cautions import serious_of
-from twinloop.faces.files import check_writable, write_text
+from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
@@ -39,7 +40,7 @@ def new(file: Path, as_json: bool) -> None:
     if file.exists():
         raise InvalidInput(f"File {file}: expected none there, found one; choose another name, or remove it.")
     store = file.with_suffix(".db")
-    write_text(file, template(str(store)))
+    write_whole(file, template(str(store)))
     text = f"Wrote {file}: fill it in, then ask for the first test: {to_type('ask', store)}"
     answer({"files": [str(file)], "store": str(store)}, text, as_json)
 

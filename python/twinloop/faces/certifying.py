@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
+from twinloop._ground.writing import write_whole
 from twinloop.autopilots import Autopilot
 from twinloop.autopilots.files import FORMATS
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.certificate import facts, page
-from twinloop.faces.files import write_text
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
 from twinloop.faces.result import to_json
 from twinloop.store import shown_name
@@ -51,9 +51,9 @@ def certify(
         (output / f"gains{suffix}").unlink(missing_ok=True)
     # What takes the gains back is there before what sets them, whatever happens between.
     for file, text in texts.values():
-        write_text(output / file, text)
-    write_text(output / "certificate.json", to_json(certified))
-    write_text(output / "certificate.html", html)
+        write_whole(output / file, text)
+    write_whole(output / "certificate.json", to_json(certified))
+    write_whole(output / "certificate.html", html)
     files = [str(output / file) for file, _ in texts.values()]
     sheet = output / "certificate.html"
     text = f"Granted: {'; '.join([str(sheet), *([', '.join(files)] if files else [])])}."

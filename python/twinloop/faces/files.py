@@ -1,13 +1,12 @@
-"""Files that a command will write: refused before any work is done, written whole or not at all."""
+"""Files that a command will write: refused before any work is done."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from twinloop.errors import InvalidInput, writing
+from twinloop.errors import InvalidInput
 from twinloop.faces.plots import SUFFIXES, require
 
 
@@ -56,22 +55,3 @@ def check_picture(path: Path) -> None:
     """
     check_writable(path, SUFFIXES)
     require()
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a whole file at once.
-
-    Args:
-        path: of the file; what was there is replaced.
-        text: its contents.
-
-    Raises:
-        OSError: it cannot be written; what was there is still there.
-    """
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with writing(path):
-            draft.write_text(text, encoding="utf-8")
-            draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)

@@ -10,12 +10,13 @@ import click
 
 from twinloop._experiment.limits import Limits
 from twinloop._ground.texts import to_type, two_digits
+from twinloop._ground.writing import write_whole
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.campaign.presets import options_of
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import Watch
-from twinloop.faces.files import check_writable, write_text
+from twinloop.faces.files import check_writable
 from twinloop.faces.report.page import report_page, templates
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.run_info import Stopwatch
@@ -76,7 +77,7 @@ def identify(
     found = _facts(twin, [*logs, *held_out], [*runs, *apart], len(runs))
     click.echo(to_json(found) if as_json else _text(twin, found), nl=False)
     if report is not None:
-        write_text(
+        write_whole(
             report,
             report_page(
                 campaign,

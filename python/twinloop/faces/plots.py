@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, assessment, controller_to_fly
 from twinloop.campaign.examination.beside import Beside
 from twinloop.errors import NotAvailable
@@ -196,7 +198,9 @@ def _save(figure: Any, path: Path) -> None:
     for axes in figure.get_axes():
         axes.set_position([round(float(edge), 4) for edge in axes.get_position().bounds])
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    figure.savefig(path, dpi=150, metadata=metadata)
+    contents = io.BytesIO()
+    figure.savefig(contents, format=path.suffix.lower()[1:], dpi=150, metadata=metadata)
+    write_whole(path, contents.getvalue())
 
 
 def _runs(figure: Any, campaign: Campaign) -> None:

@@ -8,12 +8,12 @@ import click
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.writing import write_whole
 from twinloop.autopilots.sweep import AXES
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen
 from twinloop.errors import NotAvailable
 from twinloop.faces.answering import answer, json_option
-from twinloop.faces.files import write_text
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
 from twinloop.faces.telling import numbered
 from twinloop.logs import TIME, write_columns
@@ -74,7 +74,7 @@ def settings(
     columns = _columns(campaign, asked)
     output.mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():
-        write_text(output / file, text)
+        write_whole(output / file, text)
     table = output / f"test-{test}-commands.csv"
     write_columns(table, columns)
     written = [str(output / file) for file in [*texts, table.name]]

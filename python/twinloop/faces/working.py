@@ -11,10 +11,11 @@ import click
 
 from twinloop._ground.arrays import number
 from twinloop._ground.texts import to_type
+from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky
 from twinloop.faces.console import Watch
-from twinloop.faces.files import check_picture, check_writable, write_text
+from twinloop.faces.files import check_picture, check_writable
 from twinloop.faces.result import Result, summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_closed, is_utf_8
@@ -133,7 +134,7 @@ def work(
         campaign.close()
     try:
         if output is not None:
-            write_text(output, to_json(result))
+            write_whole(output, to_json(result))
             click.echo(f"Result: {output}", err=True)
     finally:  # a full disk must not take the result with it
         show_result(result, as_json)

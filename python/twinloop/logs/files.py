@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at, writing
+from twinloop._ground.writing import write_whole
+from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
 from twinloop.logs.headers import advice, listed
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
@@ -166,23 +167,24 @@ def read_log(
 
 
 def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
-    """Writes a CSV file; numbers have all their digits.
+    """Writes a CSV file, whole or not at all; numbers have all their digits.
 
     Args:
         path: of the file; what was there is replaced.
         columns: by name; a shorter one ends with empty cells.
 
     Raises:
-        OSError: the file cannot be written.
+        OSError: it cannot be written; what was there is still there.
     """
     rows = max(len(values) for values in columns.values())
-    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for row in range(rows):
-            writer.writerow(
-                [repr(float(values[row])) if row < len(values) else "" for values in columns.values()]
-            )
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(columns)
+    for row in range(rows):
+        writer.writerow(
+            [repr(float(values[row])) if row < len(values) else "" for values in columns.values()]
+        )
+    write_whole(path, table.getvalue())
 
 
 def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats]) -> None:

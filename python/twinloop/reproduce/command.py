@@ -7,9 +7,10 @@ from pathlib import Path
 import click
 
 from twinloop._ground.arrays import whole
+from twinloop._ground.writing import write_whole
 from twinloop.campaign import available_threads
 from twinloop.errors import InvalidInput, unknown
-from twinloop.faces.files import check_picture, check_writable, write_text
+from twinloop.faces.files import check_picture, check_writable
 from twinloop.faces.result import to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_utf_8
@@ -75,7 +76,7 @@ def reproduce(
     stopwatch = Stopwatch(available_threads() if threads is None else threads)
     result = {**STUDIES[study].compute(setting), "smoke": smoke, "run_info": stopwatch.info()}
     if output is not None:
-        write_text(output, to_json(result))
+        write_whole(output, to_json(result))
     if picture is not None:
         figure6.draw(result, picture)
     if as_json:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
 from twinloop._ground.arrays import number
+from twinloop._ground.writing import write_whole
 from twinloop.errors import InvalidInput, NoAnswer, TwinloopError
 from twinloop.logs import load
 from twinloop.signals import Signals
@@ -105,9 +105,7 @@ class Folder(System):
                 f"Folder {self.path}: expected no {log.name} before its test was asked for, found one; take an empty"
                 " folder, or attach that log."
             )
-        draft = file.with_name(f".{file.name}.{os.getpid()}")
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(file)
+        write_whole(file, text)
 
     def _logs(self, digits: str) -> list[Path]:
         logs = (self.path / f"flight-{digits}{suffix}" for suffix in (".csv", ".npz"))

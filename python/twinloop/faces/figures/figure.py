@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.writing import write_whole
 
 ROLES = ("measured", "twin", "target", "limit", "old", "worst", "a", "b", "c", "d", "e", "f")
 """What a mark stands for; each has its own colour and dash, the same in all figures."""
@@ -211,12 +212,12 @@ class Figure:
             InvalidInput: another ending, or a file that cannot be written.
             NotAvailable: PDF or PNG, and vl-convert is missing.
         """
-        from twinloop.faces.figures.saving import FORMATS, picture, written
+        from twinloop.faces.figures.saving import FORMATS, picture
         from twinloop.faces.files import check_writable
 
         where = Path(path)
         check_writable(where, [f".{form}" for form in FORMATS])
-        written(picture(self, where.suffix.lower()[1:]), where)
+        write_whole(where, picture(self, where.suffix.lower()[1:]))
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-from twinloop.errors import NotAvailable, unknown, writing
+from twinloop.errors import NotAvailable, unknown
 from twinloop.faces.figures.figure import Figure
 from twinloop.faces.figures.style import LIGHT
 from twinloop.faces.figures.svg import drawing
@@ -49,22 +48,6 @@ def picture(figure: Figure, form: str) -> bytes:
     plain = _without_variables(text)
     found = _converter()
     return bytes(found.svg_to_pdf(plain) if form == "pdf" else found.svg_to_png(plain, scale=SCALE))
-
-
-def written(contents: bytes, path: Path) -> None:
-    """Writes a whole file at once.
-
-    Args:
-        contents: of it.
-        path: of the file; what was there is replaced.
-    """
-    draft = path.with_name(f".{path.name}.draft")
-    try:
-        with writing(path):
-            draft.write_bytes(contents)
-            draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def _without_variables(text: str) -> str:

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from twinloop._ground.writing import write_whole
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.figures.catalogue import FIGURES
-from twinloop.faces.figures.saving import FORMATS, check_format, picture, written
-from twinloop.faces.files import check_writable, write_text
+from twinloop.faces.figures.saving import FORMATS, check_format, picture
+from twinloop.faces.files import check_writable
 from twinloop.faces.report.comparison import compared, comparison, comparison_page
 from twinloop.faces.report.page import source_page, templates
 from twinloop.faces.report.source import source
@@ -39,7 +40,7 @@ def report(campaign: str, name: str | None, output: Path | None, form: str | Non
     templates()  # what is missing is said before any work
     found = source(campaign, name)
     text = source_page(found)
-    write_text(path, text)
+    write_whole(path, text)
     answer({"files": [str(path)]}, f"Report: {path}", as_json, err=True)
 
 
@@ -57,7 +58,7 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[s
         figure = drawn(examined)
         if figure is not None:
             path = folder / f"{figure_name}.{form}"
-            written(picture(figure, form), path)
+            write_whole(path, picture(figure, form))
             files.append(str(path))
     return files
 
@@ -88,5 +89,5 @@ def compare(first: str, second: str, names: tuple[str, ...], output: Path | None
     found = comparison(names_shown, answers)
     answer({"campaigns": names_shown, "answers": answers}, table(list(found.head), found.rows), as_json)
     if output is not None:
-        write_text(output, comparison_page(found))
+        write_whole(output, comparison_page(found))
         click.echo(f"Page: {output}", err=True)

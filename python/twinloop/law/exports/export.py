@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.writing import write_whole
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.law.exports.c_source import c_source
@@ -276,7 +277,7 @@ def delivered(contents: Contents, name: str, path: Path | None) -> str | tuple[P
         if isinstance(content, str):
             content = content.replace(include, f'#include "{path.stem}.h"').encode()
         try:
-            file.write_bytes(content)
+            write_whole(file, content)
         except OSError as reason:
             raise InvalidInput(f"Export: expected to be able to write {str(file)!r}: {reason}.") from reason
         written.append(file)
