@@ -21,6 +21,7 @@ from lives import PLANT, stored
 pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
 pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
 
+from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.faces.dashboard import app, desk
 from twinloop.faces.dashboard.command import prepared
 
@@ -284,3 +285,55 @@ def test_only_one_long_thing_goes_on_at_a_time(store, monkeypatch):
 def test_the_pages_of_a_server_are_headed_without_its_password(monkeypatch):
     monkeypatch.setattr(desk, "opened", lambda _: contextlib.ExitStack())  # something to be closed
     assert desk.Desk("postgresql://me:s3cret@h").title == "postgresql://me:***@h"
+
+
+@pytest.fixture
+def unlearnt(tmp_path):
+    """A store with a flight that was told, another test that waits, and nothing learnt."""
+    campaign = stored(tmp_path / "rig.db", preset="default")
+    test = campaign.test(PENDULUM_GAINS)
+    campaign.tell(test, PLANT.run(test))
+    campaign.test(PENDULUM_GAINS)
+    campaign.close()
+    return tmp_path / "rig.db"
+
+
+def test_looking_learns_nothing_and_says_what_is_not_learnt_yet(unlearnt, monkeypatch):
+    monkeypatch.setattr(Learner, "learnt", lambda *_, **__: pytest.fail("learnt"))
+    said = "Not learnt yet: 1 experiment; to learn now, plan the next test."
+    with served(unlearnt) as address:
+        status, _, report = call(address, "GET", "/c/1/report")
+        assert status == 200 and said in report and "Traceback" not in report
+        assert json.loads(call(address, "GET", "/c/1/tests")[2])["unlearnt"] == said
+        assert "TEST 1" in call(address, "GET", "/c/1/tests/1/sheet")[2]
+        columns = call(address, "GET", "/c/1/tests/1/columns.csv")[2]
+        assert columns.startswith("t,") and "predicted" not in columns
+
+
+def test_the_report_of_what_was_learnt_stays_while_a_later_flight_is_not(store, tmp_path, monkeypatch):
+    log = flight(tmp_path / "flight.csv", look(store).tests[1])
+    with served(store) as address:
+        assert json.loads(call(address, "GET", "/c/1/tests")[2])["unlearnt"] == ""
+        assert call(address, "POST", "/c/1/tests/1/log?file=flight.csv", log)[0] == 200
+        monkeypatch.setattr(Learner, "learnt", lambda *_, **__: pytest.fail("learnt"))
+        assert "1 experiment;" in json.loads(call(address, "GET", "/c/1/tests")[2])["unlearnt"]
+        assert "<html" in call(address, "GET", "/c/1/report")[2]
+
+
+def test_who_asks_for_a_report_at_the_same_time_waits_for_the_same_page(store, monkeypatch):
+    made = []
+
+    def page(found):
+        made.append(found.campaign.threads)
+        time.sleep(0.3)
+        return "the page"
+
+    monkeypatch.setattr(app, "source_page", page)
+    with served(store) as address:
+        asking = [threading.Thread(target=call, args=(address, "GET", "/c/1/report")) for _ in range(3)]
+        for each in asking:
+            each.start()
+        for each in asking:
+            each.join()
+        assert call(address, "GET", "/c/1/report")[2] == "the page"
+    assert made == [1]  # once, with as many threads as the dashboard was given

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tempfile
+import threading
 from collections.abc import Awaitable, Callable
 from importlib import resources
 from pathlib import Path
@@ -19,9 +20,9 @@ from starlette.routing import Route
 from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
-from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
+from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
 from twinloop.faces.cautions import serious_of
-from twinloop.faces.dashboard.desk import Desk, to_be_flown
+from twinloop.faces.dashboard.desk import Desk, to_be_flown, unlearnt
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
@@ -80,6 +81,7 @@ class Pages:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self._reports: dict[str, tuple[str, str]] = {}
+        self._one_report = threading.Lock()  # who asks at the same time waits for the same page
         folder = resources.files("twinloop.faces.dashboard")
         self._files = {
             name: folder.joinpath(name).read_text("utf-8") for name in ("page.html", "dashboard.js")
@@ -202,6 +204,7 @@ class Pages:
         bounded = is_bounded(campaign.signals)
         return {
             "experiments": len(campaign.experiments),
+            "unlearnt": unlearnt(campaign),
             "tests": [
                 {
                     "number": test.number,
@@ -225,23 +228,31 @@ class Pages:
         }
 
     def _report(self, name: str) -> str:
+        with self._one_report:
+            return self._report_of(name)
+
+    def _report_of(self, name: str) -> str:
         now = str(self.desk.state(name)["state"])
         if self._reports.get(name, ("", ""))[0] != now:
-            found = source(self.desk.store, name)
+            found = source(self.desk.store, name, self.desk.threads)
+            if not found.campaign.history:
+                raise NotAvailable(
+                    f"Report: expected a learnt experiment, found none. {unlearnt(found.campaign)}"
+                )
             self._reports[name] = now, source_page(found)
         return self._reports[name][1]
 
     def _sheet(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
         test = numbered(campaign, number)
-        predicted = foreseen(campaign, test)
+        predicted = foreseen(campaign, test) if campaign.history else None
         against = serious_of(latest_lesson(campaign))
         return sheet(self.desk.title, test, predicted, f"test-{number}.csv", campaign.setup, against)
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
         test = numbered(campaign, number)
-        predicted = foreseen(campaign, test)
+        predicted = foreseen(campaign, test) if campaign.history else None
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "columns.csv"
             write_columns(path, columns(test, predicted))

@@ -94,6 +94,7 @@
     }
     get("tests").replaceChildren(...cards);
     choose(found.recorded || []);
+    get("unlearnt").textContent = found.unlearnt || "";
     if (state !== null) frame.contentWindow.location.replace(at + "/report");
   };
   const look = async () => {

@@ -52,7 +52,7 @@ class Desk:
             return listed(base)
 
     def look(self, name: str) -> Campaign:
-        """A campaign to look at.
+        """A campaign to look at, which learns nothing.
 
         Args:
             name: of the campaign.
@@ -60,7 +60,9 @@ class Desk:
         Raises:
             InvalidInput: no such campaign.
         """
-        return Campaign.load(self.store, name, read_only=True, threads=self.threads, progress=None)
+        campaign = Campaign.load(self.store, name, read_only=True, threads=self.threads, progress=None)
+        campaign.interrupted = True  # what was learnt so far is enough
+        return campaign
 
     def state(self, name: str) -> dict[str, object]:
         """Whether anything has changed, what is going on, and why the last long thing failed.
@@ -255,6 +257,18 @@ def to_be_flown(campaign: Campaign) -> list[Test]:
         campaign: of them.
     """
     return [test for test in campaign.tests if campaign.status(test) == "asked"]
+
+
+def unlearnt(campaign: Campaign) -> str:
+    """How many flights are not learnt yet, and what to do; empty where all are.
+
+    Args:
+        campaign: to look at.
+    """
+    count = len(campaign.experiments) - (len(campaign.history[-1].tests) if campaign.history else 0)
+    if count <= 0:
+        return ""
+    return f"Not learnt yet: {count} experiment{'' if count == 1 else 's'}; to learn now, plan the next test."
 
 
 def in_words(seen: Doing) -> str:

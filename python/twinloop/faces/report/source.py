@@ -41,18 +41,19 @@ class Source:
     elapsed: float | None = None
 
 
-def source(where: str, name: str | None = None) -> Source:
+def source(where: str, name: str | None = None, threads: int | None = None) -> Source:
     """Opens a campaign to look at it; nothing is changed, and a writer is not held up.
 
     Args:
         where: a store, or a file with the record of a campaign as JSON.
         name: of the campaign in a store that holds several; of a record, for its title.
+        threads: of the engine; None: all.
 
     Raises:
         InvalidInput: neither of both, or no such campaign.
         NotAvailable: nothing was told yet.
     """
-    found = _of_record(Path(where), name) if _is_json(where) else _of_store(where, name)
+    found = _of_record(Path(where), name, threads) if _is_json(where) else _of_store(where, name, threads)
     if not found.campaign.experiments:
         raise NotAvailable(
             f"Report: expected a campaign with at least one experiment, found {found.name!r} without one; fly a"
@@ -71,7 +72,7 @@ def _is_json(where: str) -> bool:
         return file.read(64).lstrip()[:1] == b"{"
 
 
-def _of_record(path: Path, name: str | None) -> Source:
+def _of_record(path: Path, name: str | None, threads: int | None) -> Source:
     if path.stat().st_size > LARGEST:
         raise InvalidInput(
             f"File {str(path)!r}: expected at most 1 GiB of JSON, found {path.stat().st_size} bytes."
@@ -87,13 +88,13 @@ def _of_record(path: Path, name: str | None) -> Source:
             f"{what}: expected the record of a campaign, as campaign.to_record() gives, found another JSON; a result"
             " that `--output` wrote has no flights to examine: keep the campaign with --store."
         )
-    return Source(Campaign.from_record(record), name or path.stem, OWN, ())
+    return Source(Campaign.from_record(record, threads=threads), name or path.stem, OWN, ())
 
 
-def _of_store(where: str, name: str | None) -> Source:
+def _of_store(where: str, name: str | None, threads: int | None) -> Source:
     held = look(where, name, read_only=True)
     kind = OWN if held.system is None else str(held.system.get("kind", "")).replace("_", " ")
-    campaign = Campaign.load(where, held.name, read_only=True)
+    campaign = Campaign.load(where, held.name, read_only=True, threads=threads)
     sessions = [_session(session) for session in held.sessions]
     return Source(campaign, held.name, kind, sessions, _elapsed(held))
 
