@@ -1,0 +1,42 @@
+"""What a page lists is all that there is, and what it quotes is what is said."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from twinloop.campaign.campaign_file import SECTIONS
+from twinloop.faces.dashboard.desk import LOST, in_words
+from twinloop.store import Doing
+from twinloop_exam.command import bench
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def section(page, heading):
+    text = (DOCS / page).read_text("utf-8").partition(f"## {heading}\n")[2]
+    assert text
+    return re.split(r"^#+ ", text, maxsplit=1, flags=re.MULTILINE)[0]
+
+
+def test_every_section_of_a_campaign_file_is_in_its_table():
+    listed = re.findall(r"^\| `\[?(\w+)", section("by-hand.md", "The campaign file"), re.MULTILINE)
+    assert sorted(listed) == sorted(SECTIONS)
+
+
+@pytest.mark.parametrize("study", ["power", "zoo"])
+def test_every_option_of_a_study_is_in_its_table(study):
+    verb = bench.commands[study]
+    options = {name for option in verb.params for name in option.opts if name.startswith("--")}
+    listed = re.findall(
+        r"^\| `(--[\w-]+)", section("command-line.md", f"`twinloop bench {study}`"), re.MULTILINE
+    )
+    assert set(listed) == options
+
+
+def test_the_page_on_the_dashboard_quotes_what_is_said_of_a_writer_that_was_killed():
+    doing = {"told": 1, "experiments": 2, "left": None, "phase": "terms", "generation": 1, "generations": 2}
+    said = in_words(Doing(doing, LOST + 1.0))
+    text = " ".join((DOCS / "dashboard.md").read_text("utf-8").split())
+    quoted = re.search(r'after two minutes "(.*?)…(.*?)"', text)
+    assert quoted is not None and LOST == 120.0 and all(words in said for words in quoted.groups())
