@@ -573,6 +573,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
     ) -> str | tuple[Path, ...]:
         """A controller as Python or C99 without dependencies, one call per period; clipped, with all its options.
 
+        Without `parameters` it is refused if its gains have not flown inside the envelope and would not be certified.
         It is run on the states of the campaign's flights and compared with the controller itself: differences above
         1e-9 of a command's scale are refused (1e-3 in single precision).
 
@@ -581,13 +582,14 @@ class Campaign(Shown, Persistent, kind="campaign"):
             parameters: gains, by name or in order; None: those of `best_test`.
             kind: of the file, if its suffix is not enough.
             precision: of C, "double" or "float".
-            force: exports without the comparison.
+            force: exports without the comparison, and what is not certified.
 
         Returns:
             The text if `to` is a kind (in C the header, then the source), else the paths that were written.
 
         Raises:
             InvalidInput: unknown gains, no such kind, or a path that cannot be written.
+            NotTrusted: no controller to fly, or one that has not flown and is refused a certificate.
             NotAvailable: a family in Python, or an export that could not be checked.
         """
         return taken_controller(self, to, kind, parameters, precision, force)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from twinloop.errors import NotTrusted
 from twinloop.law.exports.export import asked, delivered, exported_controller
 from twinloop.law.exports.gymnasium_source import Episode
+from twinloop.test import Test
 
 if TYPE_CHECKING:
     from twinloop.campaign.campaign import Campaign
@@ -42,6 +43,8 @@ def taken_controller(
 ) -> str | tuple[Path, ...]:
     """A controller as `Campaign.export_controller` describes it, compared on the flights of the campaign."""
     kind, path = asked(to, kind)
+    if parameters is None and not force:
+        _refuse_unproven(campaign)
     genes = campaign.best_test.genes if parameters is None else campaign.family.genes(parameters)
     name = "controller" if path is None else path.stem
     flights = [] if force else [run.trajectory for run in campaign.experiments]
@@ -50,3 +53,22 @@ def taken_controller(
         setup.controller, setup.family, genes, kind, name, precision, flights, setup.target_state
     )
     return delivered(texts, name, path)
+
+
+def _refuse_unproven(campaign: Campaign) -> None:
+    """Refuses gains of the twin's choice that have neither flown inside the envelope nor would be certified."""
+    genes = campaign.best_test.genes.tobytes()
+    flown = [run.kept_envelope for run in campaign.experiments if _flies(run.test, genes)]
+    failed = any(_flies(failure.test, genes) for failure in campaign.failures)
+    if flown and all(flown) and not failed:
+        return
+    refusals = campaign.certificate().refusals
+    if refusals:
+        raise NotTrusted(
+            "Export: expected a controller that has flown inside the envelope, or would be certified, found:"
+            f" {' '.join(refusals)} Learn from more tests, name the gains, or pass --force (force=True in Python)."
+        )
+
+
+def _flies(test: Test | None, genes: bytes) -> bool:
+    return test is not None and test.genes.tobytes() == genes
