@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from twinloop.campaign.identify_and_plan.calibration import calibrated
+from twinloop.campaign.identify_and_plan.calibration import calibrated, held_to
 from twinloop.planning.judging import expected
 
 
@@ -31,6 +31,15 @@ def test_a_spread_is_no_smaller_than_what_predictions_missed_by():
     missed = [flight(1.1, 1.0), flight(2.2, 2.0), flight(0.55, 0.5)]
     assert calibrated(1e-6, 3.0, missed) == pytest.approx(2.0 * 0.1 * 3.0)
     assert calibrated(9.0, 3.0, missed) == 9.0
+
+
+def test_before_any_prediction_was_flown_a_spread_is_what_second_flights_miss_by_and_confirms_no_more_for_it():
+    assert calibrated(1e-6, 3.0, []) == pytest.approx(0.15 * 3.0)
+    assert calibrated(9.0, 3.0, []) == 9.0
+    assert held_to(3.0, calibrated(1e-6, 3.0, [])) == pytest.approx(0.04 * 3.0)
+    assert held_to(3.0, calibrated(9.0, 3.0, [])) == 9.0
+    missed = [flight(1.1, 1.0)]
+    assert held_to(3.0, calibrated(1e-6, 3.0, missed)) == calibrated(1e-6, 3.0, missed)
 
 
 def test_flights_without_a_prediction_or_a_quality_tell_nothing_of_it():

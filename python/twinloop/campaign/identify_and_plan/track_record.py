@@ -10,6 +10,7 @@ import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.calibration import held_to
 from twinloop.planning.proposal import Fared
 from twinloop.signals import Signals
 
@@ -148,7 +149,8 @@ def _came_true(run: Experiment, share: float) -> bool:
     test = run.test
     if test is None or test.predicted is None or test.spread is None or run.quality is None:
         return False
-    return bool(abs(test.predicted - run.quality) <= max(SURE * test.spread, share * run.quality))
+    spread = held_to(test.predicted, test.spread)
+    return bool(abs(test.predicted - run.quality) <= max(SURE * spread, share * run.quality))
 
 
 def _better(run: Experiment) -> bool:
