@@ -19,7 +19,7 @@ FRONTS = {
     "autopilots": "declared files sweep",
     "campaign": "assessment campaign_file certificate cost from_logs history keeping presets remaining setup",
     "campaign/coevolution": "method search",
-    "campaign/data": "declared gains lateness levels readings reports sent wrapped",
+    "campaign/data": "begun declared gains lateness levels readings reports sent wrapped",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "reaching rivals steps unseen use"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from twinloop._experiment.envelope import gone_from, readings_leave, usages_of
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.begun import off_start
 from twinloop.campaign.data.gains import FlownOtherwise
 from twinloop.law.actuation import HiddenState, renewed_hidden
 from twinloop.objectives import normalised_error
@@ -70,10 +72,15 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
         """Whether it ran to its end and never left the envelope; False for a run that was cut."""
         return self.complete and not self.left_envelope
 
+    @cached_property
+    def off_start(self) -> tuple[int, ...]:
+        """States that began elsewhere than its test does: what was predicted is then of another flight."""
+        return () if self.test is None else off_start(self.test, self.trajectory)
+
     @property
     def miss(self) -> float | None:
-        """Predicted minus measured quality; None without both."""
-        predicted = None if self.test is None else self.test.predicted
+        """Predicted minus measured quality; None without both, or where it began elsewhere."""
+        predicted = None if self.test is None or self.off_start else self.test.predicted
         return None if predicted is None or self.quality is None else predicted - self.quality
 
     @property

@@ -43,11 +43,15 @@ def status(book: Logbook, test: object) -> str:
 def measured(book: Logbook, test: int) -> float | None:
     """Quality of a test on the system, mean over complete runs; None if there was none.
 
+    Runs that began elsewhere than the test count only where all did.
+
     Args:
         book: of the campaign.
         test: its number.
     """
-    values = [run.quality for run in _runs(book, test) if run.quality is not None]
+    runs = [run for run in _runs(book, test) if run.quality is not None]
+    as_asked = [run for run in runs if not run.off_start]
+    values = [run.quality for run in as_asked or runs if run.quality is not None]
     return math.fsum(values) / len(values) if values else None
 
 
@@ -220,12 +224,15 @@ def times_flown(book: Logbook, genes: Floats) -> int:
 
 
 def on_task(book: Logbook, test: Test) -> bool:
-    """Whether a test begins and leads where the campaign does.
+    """Whether a test begins and leads where the campaign does, and so did a flight of it, if it was flown.
 
     Args:
         book: of the campaign.
         test: of the campaign.
     """
+    runs = _runs(book, test.number)
+    if runs and all(run.off_start for run in runs):
+        return False
     ends = (test.initial_state, book.setup.initial_state), (test.target_state, book.setup.target_state)
     return all(np.array_equal(*pair) for pair in ends)
 

@@ -11,7 +11,7 @@ from twinloop.planning.judging import expected
 
 def flight(predicted, quality):
     test = None if predicted is None else SimpleNamespace(predicted=predicted)
-    return SimpleNamespace(test=test, quality=quality)
+    return SimpleNamespace(test=test, quality=quality, off_start=())
 
 
 def test_what_is_expected_spreads_over_members_and_noise_alike():

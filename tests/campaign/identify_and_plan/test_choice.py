@@ -31,7 +31,7 @@ KEPT = Fared(1, 0)
 def experiment(predicted=None, quality=1.0, spread=0.01):
     test = SimpleNamespace(predicted=predicted, spread=spread, initial_state=np.zeros(2))
     trajectory = SimpleNamespace(states=np.zeros((21, 2)))
-    return SimpleNamespace(test=test, quality=quality, trajectory=trajectory)
+    return SimpleNamespace(test=test, quality=quality, trajectory=trajectory, off_start=())
 
 
 def chosen(

@@ -23,7 +23,7 @@ from twinloop.planning.proposal import Fared
 
 def experiment(predicted=None, quality=1.0, spread=0.01):
     test = SimpleNamespace(predicted=predicted, spread=spread)
-    return SimpleNamespace(test=test, quality=quality)
+    return SimpleNamespace(test=test, quality=quality, off_start=())
 
 
 def flight(predicted, spread, quality, gain, ended="completed"):
@@ -32,6 +32,7 @@ def flight(predicted, spread, quality, gain, ended="completed"):
         test=test,
         quality=quality,
         trajectory=SimpleNamespace(ended=ended),
+        off_start=(),
         left_envelope=False,
         kept_envelope=ended == "completed",
     )

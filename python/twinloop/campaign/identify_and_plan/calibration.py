@@ -111,6 +111,7 @@ def misses(flights: Iterable[Experiment]) -> list[float]:
         abs(run.test.predicted - run.quality) / abs(run.quality)
         for run in flights
         if run.test is not None
+        and not run.off_start
         and run.test.predicted is not None
         and run.quality
         and isfinite(run.test.predicted)

@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.streams import Unit
+from twinloop.campaign.data.begun import from_other_starts
 from twinloop.campaign.data.gains import from_other_gains
 from twinloop.campaign.data.levels import levels_said
 from twinloop.campaign.data.sent import other_commands
@@ -77,6 +78,7 @@ def lesson_of(
             ),
             *levels_said(identified.model, signals),
             *from_other_gains(book.experiments),
+            *from_other_starts(book.experiments),
             *diagnostics_of(book.experiments, signals, book.setup.steps, found),
         ),
         recurring=found.recurring,

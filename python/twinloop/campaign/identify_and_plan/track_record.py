@@ -134,8 +134,8 @@ def promised_in_vain(experiments: Sequence[Experiment]) -> bool:
 
 
 def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:
-    """Flights that something was predicted of, each with that."""
-    asked = [(run, run.test.predicted) for run in experiments if run.test is not None]
+    """Flights that something was predicted of, each with that; not those that began elsewhere."""
+    asked = [(run, run.test.predicted) for run in experiments if run.test is not None and not run.off_start]
     return [(run, predicted) for run, predicted in asked if predicted is not None and not np.isnan(predicted)]
 
 
