@@ -1,9 +1,11 @@
 """`campaign.run`: a test that is too risky is not flown, and one in which the system fails has failed."""
 
+import numpy as np
 import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
+from lives import CONTROLLER, SMALL
 
 
 class Failing(tl.System):
@@ -76,3 +78,28 @@ def test_what_is_riskier_than_allowed_waits_and_is_not_flown(pendulum):
     assert "still waits" not in str(refusal.value)  # nothing holds it after the process
     assert [test.number for test in campaign.waiting] == [1] and len(campaign.experiments) == 1
     assert len(campaign.run(pendulum, 2, max_risk=0.9).experiments) == 2
+
+
+def test_a_rig_of_which_no_reading_moves_is_not_flown_on_before_somebody_has_looked(pendulum):
+    """The test that waits is flown once it is run again: then somebody has."""
+
+    class Still(tl.System):
+        signals, mended, flights = pendulum.signals, False, 0
+
+        def run(self, test):
+            self.flights += 1
+            run = pendulum.run(test)
+            still = np.zeros_like(run.states)
+            return tl.Trajectory(run.t, run.states if self.mended else still, run.commands)
+
+    rig = Still()
+    campaign = tl.Campaign(
+        rig.signals, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        options=SMALL,
+    )  # fmt: skip
+    campaign.test(PENDULUM_GAINS)
+    with pytest.raises(tl.NoAnswer, match=r"nothing answered.*Test 1 was not flown"):
+        campaign.run(rig, 3)
+    assert rig.flights == 1 and [test.number for test in campaign.waiting] == [1]
+    rig.mended = True
+    assert len(campaign.run(rig, 3).experiments) == 3

@@ -360,7 +360,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             KeyboardInterrupt: Ctrl-C. No run is lost: `interrupted` is true, the results give the best so far, and
                 another call continues with the same bits.
             NotAvailable: there is no first test.
-            NoAnswer: the system did not answer in time; its test still waits, in a store also for another process.
+            NoAnswer: the system did not answer in time; its test still waits, in a store also for another process. Or
+                commands have moved and no reading ever has; the next test waits.
             SystemFailure: the first test failed, or two in a row; the failures are in the campaign.
             TooRisky: a test is riskier than `max_risk`; it waits. Raise `max_risk`, fly it by hand, or abandon it.
         """

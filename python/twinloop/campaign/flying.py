@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from twinloop._ground.arrays import share, whole
 from twinloop._ground.texts import whole_characters
+from twinloop.campaign.assessment import latest_lesson
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.signals import Signals
 from twinloop.systems import System
@@ -76,8 +77,11 @@ def fly(
     """
     failed = False
     while campaign.runs < budget:
+        waited = bool(campaign.waiting)
         test = _next(campaign, system, last=campaign.runs + 1 == budget)
         check_signals(test, system.signals)
+        if not waited:
+            _refuse_silence(campaign, test)
         if test.risk is not None and test.risk > allowed:
             # Without a store it waits as long as this process lasts, and a command ends with this sentence.
             kept = (
@@ -91,6 +95,21 @@ def fly(
             )
         announce()
         failed = _flown(campaign, system, test, timeout, failed)
+
+
+def _refuse_silence(campaign: Campaign, test: Test) -> None:
+    """Ends the loop where no reading ever moved: somebody has to look at the rig. A test that waits flies then."""
+    lesson = latest_lesson(campaign)
+    silent = (
+        []
+        if lesson is None
+        else [each for each in lesson.remarks if each.code == "never-moved" and each.serious]
+    )
+    if silent:
+        raise NoAnswer(
+            f"Campaign.run: expected readings that move, found: {silent[0].sentence} Test {test.number} was not flown;"
+            " where all is well now, run again to fly it, and withdraw the flights without readings."
+        )
 
 
 def _next(campaign: Campaign, system: System, last: bool) -> Test:

@@ -219,7 +219,13 @@ class Examination:
         """Predicted minus flown quality of the last flight that has both, in predicted spreads."""
         for run in reversed(self.experiments):
             test = run.test
-            if test is None or run.off_start or run.quality is None or test.predicted is None or not test.spread:
+            if (
+                test is None
+                or run.off_start
+                or run.quality is None
+                or test.predicted is None
+                or not test.spread
+            ):
                 continue
             return (test.predicted - run.quality) / test.spread if math.isfinite(test.predicted) else math.inf
         return None
