@@ -55,10 +55,50 @@ def test_in_noise_the_first_readings_are_followed_as_closely_as_any_rate_follows
     assert found[1] == pytest.approx(least_squares(missed, [0.0]).x[0], abs=1e-6)
 
 
-def test_what_is_read_is_taken_as_it_is():
-    read, commands = record(noise=5e-3)
-    assert same_bits(start_of(PLAIN, read, commands, LIMITS), read[0])
+def read_of_all(noise, seed=0, steps=60, start=START):
+    """True states of a swing, and readings of both with noise, in shares of their scales."""
+    stream = np.random.default_rng(seed)
+    commands = np.repeat(stream.uniform(-2.0, 2.0, (steps // 4, 1)), 4, axis=0)
+    true = fly(PLAIN, Replay(SIGNALS, start, commands), limits=LIMITS).states
+    return true, true + noise * np.array([3.0, 8.0]) * stream.standard_normal(true.shape), commands
+
+
+def test_within_a_record_what_is_read_is_taken_as_it_is():
+    read, _ = record(noise=5e-3)
     assert same_bits(states_read(PLAIN, read, SIGNALS), read)
+
+
+def test_without_noise_what_is_read_is_where_it_begins():
+    _, read, commands = read_of_all(0.0)
+    np.testing.assert_allclose(start_of(PLAIN, read, commands, LIMITS), START, atol=1e-9)
+
+
+def test_it_begins_where_the_first_readings_are_the_likeliest():
+    """Beside least squares of scipy, with the noise by third differences."""
+    _, read, commands = read_of_all(0.01)
+    noise = np.sqrt(np.median(np.diff(read, n=3, axis=0) ** 2, axis=0) / (0.4549 * 20.0))
+
+    def missed(start):
+        states = fly(PLAIN, Replay(SIGNALS, start, commands[:FIRST]), limits=LIMITS).states
+        return ((states - read[: FIRST + 1]) / noise).ravel()
+
+    found = start_of(PLAIN, read, commands, LIMITS)
+    np.testing.assert_allclose(found, least_squares(missed, read[0], xtol=1e-12, ftol=1e-12).x, atol=1e-4)
+
+
+def test_it_begins_nearer_to_the_truth_than_the_first_reading():
+    off = []
+    for seed in range(40):
+        true, read, commands = read_of_all(0.02, seed)
+        found = start_of(PLAIN, read, commands, LIMITS)
+        off.append(np.abs([found - true[0], read[0] - true[0]]) / np.array([3.0, 8.0]))
+    nearer = np.sqrt(np.square(off).mean(axis=0))
+    assert (nearer[0] < 0.7 * nearer[1]).all()
+
+
+def test_where_the_model_diverges_from_its_readings_it_begins_as_it_was_read():
+    far = np.full((30, 2), 1e3)
+    assert same_bits(start_of(PLAIN, far, np.zeros((29, 1)), LIMITS), far[0])
 
 
 def test_within_a_record_a_computed_rate_is_the_slope_of_what_it_is_computed_of():

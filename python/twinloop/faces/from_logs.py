@@ -150,7 +150,10 @@ def _text(twin: Twin, found: dict[str, Any]) -> str:
     remarks = "".join(f"{each['severity']}: {each['sentence']}\n" for each in found["remarks"])
     errors = table(head, rows)
     pieces = [log["piece"] for log in found["logs"] if log["piece"] < log["seconds"] - 0.5 * twin.signals.dt]
-    note = "FIT: of the free run from the first reading; 100 is perfect, 0 no better than the mean."
+    note = (
+        "FIT: of the free run from where the first readings say that it began; 100 is perfect, 0 no better than the"
+        " mean."
+    )
     if pieces:
         every = f"every {_span(pieces)} s"
         note += (

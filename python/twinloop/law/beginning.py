@@ -1,8 +1,10 @@
 """Beginning: the state in which a record, or a piece of it, begins for a model.
 
-It is as it was read, except for rates that are computed of readings: these lie half a period behind, and have the
-noise of a difference over a period. Within a record such a rate is the slope of what it is computed of; at its start,
-that with which the model follows the first readings best (steps of Gauss and Newton, one rate after the other).
+Within a record it is as it was read, except for rates that are computed of readings: these lie half a period behind,
+and have the noise of a difference over a period. Such a rate is the slope of what it is computed of. At the start of a
+record the noise of a single reading would be all that a free run shows of it, where nothing corrects it later on. So it
+is the state with which the model follows the first readings best, the very first among them, each by its noise (steps
+of Gauss and Newton; of computed rates one after the other).
 """
 
 from __future__ import annotations
@@ -13,6 +15,8 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import product
+from twinloop.controllers.riccati import solve_linear
 from twinloop.law.flight import drawn_runs
 from twinloop.law.reports import computed, reports_of, slopes_of
 from twinloop.signals import Signals
@@ -23,6 +27,8 @@ TURNS = 4
 """Steps for each rate."""
 BESIDE = 1e-3
 """Share of its scale by which a rate is varied for the slopes of the readings."""
+EXACT = 1e-6
+"""Least noise of a sensor, as a share of its state's scale, by which its readings count."""
 TINY = 1e-300
 """So that what does not show is not divided by nothing."""
 
@@ -61,8 +67,10 @@ def start_of(
     rates = list(computed(reports_of(model, signals.n_x)))
     start: Floats = model.states_of(readings[:1])[0]
     steps = min(FIRST, len(commands))
-    if not rates or not steps:
+    if not steps:
         return start
+    if not rates:
+        return _smoothed(model, start, readings, commands[:steps], limits, workers)
     begun = states_read(model, readings, signals)[0]
     scales = np.array([state.scale for state in signals.states])
     others = [i for i in range(signals.n_x) if i not in rates]
@@ -90,3 +98,54 @@ def start_of(
         if after is not None and float((after * after).sum()) < float((left * left).sum()):
             best, left = tried, after
     return best
+
+
+def _smoothed(
+    model: _core.Model,
+    read: Floats,
+    readings: Floats,
+    commands: Floats,
+    limits: Limits,
+    workers: _core.Workers | None,
+) -> Floats:
+    """The state (n_x,) with which a model follows first readings best, with what was read of it among them.
+
+    Args:
+        model: that follows.
+        read: the state as it was read (n_x,).
+        readings: of the whole record (n + 1, n_x), by which the noise of each is known.
+        commands: as sent in the first steps.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    signals, steps = limits.signals, len(commands)
+    noise = _noise(readings, np.array([state.scale for state in signals.states]))
+
+    def missed(state: Floats) -> Floats | None:
+        run = drawn_runs(model, Replay(signals, state, commands), limits, workers=workers)
+        if int(run.lasted[0]) < steps:
+            return None
+        off = signals.difference(np.asarray(run.read[0])[1:], readings[1 : steps + 1]) / noise
+        found: Floats = np.concatenate([off.ravel(), (state - read) / noise])
+        return found
+
+    best, left = read, missed(read)
+    for _ in range(TURNS):
+        beside = [missed(best + step) for step in np.diag(noise)]
+        if left is None or any(each is None for each in beside):
+            break
+        slopes = np.stack([each - left for each in beside if each is not None], axis=1)
+        step = solve_linear(product(slopes.T, slopes), product(slopes.T, left[:, np.newaxis]))
+        after = None if step is None else missed(tried := best - noise * step[:, 0])
+        if after is None or not float((after * after).sum()) < float((left * left).sum()):
+            break
+        best, left = tried, after
+    return best
+
+
+def _noise(readings: Floats, scales: Floats) -> Floats:
+    """Standard deviation of each sensor (n_x,), by third differences, which leave little of a motion."""
+    squared = np.square(np.diff(readings, n=3, axis=0)) if len(readings) > 3 else np.zeros((1, len(scales)))
+    # The median of a squared normal number is 0.4549; a third difference has twenty times the variance.
+    found: Floats = np.maximum(np.sqrt(np.nanmedian(squared, axis=0) / (0.4549 * 20.0)), EXACT * scales)
+    return found

@@ -488,9 +488,9 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         return judged_length(self.model, trajectory, noise, self.limits)
 
     def fit(self, trajectory: Trajectory) -> FitTable:
-        """How well the twin's free run under the recorded commands, from the first reading, follows a record.
+        """How well the twin's free run under the recorded commands follows a record.
 
-        On a system that is unstable without its controller it begins again at a reading after each `piece_of`.
+        It begins where the first readings say that the record does. On a system that is unstable without its controller it begins again at a reading after each `piece_of`.
 
         Args:
             trajectory: of the same signals, with at least one step.

@@ -49,13 +49,16 @@ def unseen(found: Examination) -> Figure | None:
         else f" {100.0 * last.inside:.0f} % of the readings are inside the 90 % band."
     )
     others = _earlier(found)
-    how = "its recorded commands" if last.number is None else "the test's own controller"
+    by_commands = last.number is None
+    how = "its recorded commands" if by_commands else "the test's own controller"
+    begins = "where its first readings say that it began" if by_commands else "the first reading"
+    used = "no later one was used" if by_commands else "no reading after the first was used"
     return Figure(
         "unseen",
         f"The twin against {in_words(last.number)}, which it had not learnt from",
         panels,
-        f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
-        f" {how}; no reading after the first was used.{band}{others}",
+        f"Free run from {begins} by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
+        f" {how}; {used}.{band}{others}",
     )
 
 
