@@ -490,7 +490,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
     def fit(self, trajectory: Trajectory) -> FitTable:
         """How well the twin's free run under the recorded commands follows a record.
 
-        It begins where the first readings say that the record does. On a system that is unstable without its controller it begins again at a reading after each `piece_of`.
+        It begins where the first readings say that the record does. On a system that is unstable without its controller
+        it begins again at a reading after each `piece_of`.
 
         Args:
             trajectory: of the same signals, with at least one step.
