@@ -45,7 +45,8 @@ class Test(Shown, Value, Recorded, kind="test", given=("family",)):
         hold_back: holds the excitation back during the flight; None: it is not held back.
 
     Raises:
-        InvalidInput: shapes that do not fit the family's signals, or numbers that are not finite.
+        InvalidInput: shapes that do not fit the family's signals, numbers that are not finite, or a `number` that is no
+            whole number from 0.
     """
 
     __test__ = False  # a name that pytest would otherwise collect
@@ -70,6 +71,7 @@ class Test(Shown, Value, Recorded, kind="test", given=("family",)):
         object.__setattr__(self, "genes", floats("Test.genes", self.genes, (self.family.size,)))
         object.__setattr__(self, "initial_state", floats("Test.initial_state", self.initial_state, (n_x,)))
         object.__setattr__(self, "steps", whole("Test.steps", self.steps, least=1))
+        object.__setattr__(self, "number", whole("Test.number", self.number))
         target = checked_target("Test.target_state", self.target_state, n_x, self.steps)
         object.__setattr__(self, "target_state", target)
         if self.excitation is not None:

@@ -1,6 +1,7 @@
 """What cannot be used is refused in one sentence: what was expected, what was found; never a traceback."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -273,6 +274,11 @@ def slower(system):
     return tl.systems.Simulated(tl.Signals(signals.states, signals.commands, 2.0 * signals.dt), pendulum_step)
 
 
+def tell_as(e, number):
+    """Tells a run to a test of the campaign under another number."""
+    e.campaign.tell(replace(e.test, number=number), e.campaign.experiments[0].trajectory)
+
+
 CALLS = {
     "an unknown gain": lambda e: e.campaign.test({**PENDULUM_GAINS, "angle.kq": 1.0}),
     "a missing gain": lambda e: e.campaign.test({"angle.kp": 1.0}),
@@ -281,6 +287,10 @@ CALLS = {
     "a gain in words": lambda e: e.campaign.test({**PENDULUM_GAINS, "angle.kp": "high"}),
     "two gains": lambda e: e.campaign.test([1.0, 2.0]),
     "an excitation": lambda e: e.campaign.test(PENDULUM_GAINS, excitation=np.zeros(20)),
+    "a test without its number": lambda e: tell_as(e, None),
+    "a test whose number is half": lambda e: tell_as(e, 0.5),
+    "a test with a number below zero": lambda e: tell_as(e, -1),
+    "a test with a number that was not reached": lambda e: tell_as(e, 10**9),
     "no system": lambda e: e.campaign.run("rig"),
     "a system of another period": lambda e: e.campaign.run(slower(e.system), 2),
     "half an experiment": lambda e: e.campaign.run(e.system, 1.5),
