@@ -8,6 +8,7 @@ import pytest
 from committees import TASK, committee_of, member, planner_of, signals
 from oracles import same_bits
 from twinloop._ground.streams import Unit
+from twinloop.planning import within as tuning
 from twinloop.planning.proposal import Flown, Wanted
 from twinloop.planning.reach import bounds_of, reach_of
 from twinloop.planning.seen import Seen
@@ -59,6 +60,27 @@ def test_they_keep_the_envelope_on_a_model_with_more_delay():
         return PLANNER.judge(slow, genes[np.newaxis], np.zeros(2), 1).worst_usage[0]
 
     assert usage(held) <= 1.0 < usage(free)
+
+
+def test_where_a_flight_diverges_the_mean_is_that_of_those_that_last_and_an_excess_is_in_its_units(
+    monkeypatch,
+):
+    backwards = [*COMMITTEE.members, member(KNOWN, -40.0)]
+    wild = np.array([9.0, 0.0, 0.05])
+    scores = []
+
+    def only_scored(family, score, starts, **how):
+        scores.append(score(np.stack([GENTLE, wild])))
+        return starts[0]
+
+    monkeypatch.setattr(tuning, "tune_gains", only_scored)
+    within(committee=replace(COMMITTEE, members=backwards))
+    judged = PLANNER.judge_within(SLOW, backwards, np.stack([GENTLE, wild]))
+    assert np.isinf(judged.qualities[-1]).all() and np.isfinite(judged.qualities[:-1]).all()
+    mean, excess = judged.qualities[:-1, 0].mean(axis=0), judged.usages[:-1, 0].max(axis=0) - 0.9
+    assert excess[0] < 0.0 < excess[1]
+    expected = [mean[0], mean[1] + excess[1] * (10.0 * mean[1] + mean[0])]
+    np.testing.assert_allclose(scores[0], np.stack([[0.25, 0.25], expected], axis=1), rtol=1e-12)
 
 
 @pytest.mark.parametrize("exploit", [False, True])

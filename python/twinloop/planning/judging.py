@@ -123,6 +123,13 @@ class Judged:
         return lost
 
     @property
+    def mean_of_finite(self) -> Floats:
+        """Mean quality of the flights that do not diverge (K,); 0 where none is left."""
+        finite = np.isfinite(self.qualities).sum(axis=(0, 1))
+        mean: Floats = self.finite.qualities.sum(axis=(0, 1)) / np.maximum(1, finite)
+        return mean
+
+    @property
     def finite(self) -> Judged:
         """The flights that do not diverge, with zeros for those that do."""
         lasts = np.isfinite(self.qualities)

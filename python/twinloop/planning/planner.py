@@ -132,15 +132,12 @@ class Planner(Judge):
 
         def score(genes: Floats) -> Floats:
             judged = self.judge(members, genes, sds, draws, disturbances=met)
-            lasts = judged.finite
-            mean = lasts.qualities.sum(axis=(0, 1)) / np.maximum(
-                1, np.isfinite(judged.qualities).sum(axis=(0, 1))
-            )
-            lost, usage = judged.lost, lasts.worst_usage
+            lost, usage = judged.lost, judged.finite.worst_usage
             if limiting:
                 delayed = self.judge(limiting, genes, sds, draws)
                 lost, usage = lost + delayed.lost, np.maximum(usage, delayed.finite.worst_usage)
-            return scores_of(lost, mean, np.maximum(0.0, usage - (1.0 - options.margin)), unit)
+            excess = np.maximum(0.0, usage - (1.0 - options.margin))
+            return scores_of(lost, judged.mean_of_finite, excess, unit)
 
         return score
 

@@ -46,8 +46,7 @@ def tune_within(
         Those of the least excess where none stays within.
     """
     most, nothing = 1.0 - options.margin, np.zeros(judge.signals.n_x)
-    first = judge.judge_within(bounds, members, starts[0][np.newaxis]).finite.qualities
-    unit = float(first.mean())
+    unit = float(judge.judge_within(bounds, members, starts[0][np.newaxis]).mean_of_finite[0])
 
     def score(genes: Floats) -> Floats:
         near = judge.judge_within(bounds, members, genes)
@@ -56,8 +55,7 @@ def tune_within(
             late = judge.judge(committee.delayed, genes, nothing, 1)
             lost = lost + late.lost
             excess = excess + np.maximum(0.0, late.finite.worst_usage - most)
-        mean = near.finite.qualities.mean(axis=(0, 1))
-        return scores_of(lost, mean, excess, unit)
+        return scores_of(lost, near.mean_of_finite, excess, unit)
 
     return tune_gains(
         judge.family, score, starts, evaluations=options.evaluations // 2, spread=SPREAD,
