@@ -37,20 +37,30 @@ def multiplied_by_blas(source):
 
 
 def squared_by_the_c_library(source):
-    """Lines of a source with a power of a fixed exponent, such as `x**2`; `2.0**-47` is exact."""
+    """Lines of a source with a power of a fixed exponent, such as `x**2`, or of a fraction, such as `0.7**k`.
+
+    Powers of whole numbers, such as `2.0**-47` and `10.0**k`, are exact where they decide.
+    """
     powers = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.BinOp)]
     return [
         node.lineno
         for node in powers
         if isinstance(node.op, ast.Pow)
-        and is_number(node.right)
-        and not (is_number(node.left) and float(ast.unparse(node.right)).is_integer())
+        and (
+            (is_number(node.right) and not (is_number(node.left) and is_whole(node.right)))
+            or (is_number(node.left) and not is_number(node.right) and not is_whole(node.left))
+        )
     ]
 
 
 def is_number(node):
     """Whether it is written as a number, with a sign or without."""
     return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
+
+
+def is_whole(number):
+    """Whether a written number is a whole one."""
+    return float(ast.unparse(number)).is_integer()
 
 
 @pytest.mark.parametrize("lines_of", [multiplied_by_blas, squared_by_the_c_library])
@@ -78,7 +88,16 @@ def test_a_product_by_blas_is_seen(source):
 
 
 @pytest.mark.parametrize(
-    "source, seen", [("x**2", True), ("2.0**0.5", True), ("2.0**-47", False), ("x**n", False)]
+    "source, seen",
+    [
+        ("x**2", True),
+        ("2.0**0.5", True),
+        ("0.3 * 0.7**k", True),
+        ("0.7 ** (k - 1)", True),
+        ("2.0**-47", False),
+        ("10.0**k", False),
+        ("x**n", False),
+    ],
 )
-def test_a_power_of_a_fixed_exponent_is_seen(source, seen):
+def test_a_power_of_a_fixed_exponent_or_of_a_fraction_is_seen(source, seen):
     assert bool(squared_by_the_c_library(source)) == seen

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import power
 from twinloop.identification.gaps import Masses, behind_gaps
 from twinloop.identification.search.noise import RIDGE, first_noise
 from twinloop.identification.search.problem import Problem
@@ -18,7 +19,7 @@ TURNS = (0.8, 0.15)
 """Times in which a mass turns on what presses: from this many periods to this share of the longest run, in steps of"""
 STEP = 1.6
 """this factor."""
-GAPS = tuple(0.3 * 0.7**k for k in range(13))
+GAPS = tuple(0.3 * power(0.7, k) for k in range(13))
 """Halves of gaps, in units of how far what drives the mass goes."""
 DAMPINGS = (0.05, 0.3)
 """Dampings, in units of the time in which the mass turns."""
