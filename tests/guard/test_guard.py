@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import twinloop as tl
-from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, pendulum_step
+from command import invoke
+from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, TINY, pendulum_step
 from lives import THOROUGH
 from oracles import same_bits
 from twinloop import _core
@@ -594,6 +595,40 @@ def test_gains_that_failed_are_never_fallen_back_on():
     campaign.tell(good, rigged.run(good))
     assert campaign.trusted is good
     assert campaign.guard(bad, horizon=0.0).fallback.parameters == good.parameters
+
+
+def test_the_noise_of_a_guarded_system_goes_on_where_it_was_in_another_process(tmp_path):
+    store = tmp_path / "rig.db"
+    whole = new_campaign()
+    whole.run(whole.guarded(rig(), horizon=0.0), 2)
+    for experiments in (1, 2):
+        moved = new_campaign(store=store)
+        moved.run(moved.guarded(rig(), horizon=0.0), experiments)
+        moved.close()
+    for one, other in zip(whole.experiments, moved.experiments, strict=True):
+        assert same_bits(one.trajectory.states, other.trajectory.states)
+
+
+def test_a_guarded_system_is_known_again_and_is_not_flown_on_without_its_guard(tmp_path):
+    def flown(experiments, watched, **changes):
+        system = tl.systems.Quadrotor(**changes)
+        campaign = tl.Campaign(
+            system.signals, controller=system.controller, initial_state=system.initial_state,
+            target_state=system.target_state, duration=1.0, preset="paper", options=TINY, threads=1, store=store,
+        )  # fmt: skip
+        try:
+            campaign.run(campaign.guarded(system, horizon=0.0) if watched else system, experiments)
+        finally:
+            campaign.close()
+
+    store = tmp_path / "hover.db"
+    flown(1, watched=True)
+    for watched in (True, False):
+        with pytest.raises(tl.InvalidInput, match=r"found another: noise: 0\.0 in the store, 0\.01 now"):
+            flown(2, watched, noise=0.01)
+    resumed = invoke("resume", str(store), "--experiments", "2")
+    assert resumed.exit_code != 0 and "continue from Python" in resumed.stderr
+    flown(2, watched=False)
 
 
 class OwnLoop(tl.System):

@@ -21,7 +21,8 @@ from twinloop.campaign.method import Method
 from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
-from twinloop.records import Record, Recorded
+from twinloop.guard.guarded import record_of, unguarded
+from twinloop.records import Record
 from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened, shown_name
 
 Answer = TypeVar("Answer")
@@ -151,12 +152,13 @@ class Keeping:
             InvalidInput: it is another one than the campaign has flown so far.
             StoreFailure: the store cannot be written.
         """
-        record = system.to_record() if isinstance(system, Recorded) else None
+        record = record_of(system)
         if record is not None and self._system is not None:
             what = f"Campaign.run, system: expected the one that {self.name} has flown so far"
-            _check_same({**self._system, "runs": None}, {**record, "runs": None}, what)
+            known = unguarded(self._system)
+            _check_same({**known, "runs": None}, {**unguarded(record), "runs": None}, what)
             if self._runs is None:
-                self._runs = self._system.get("runs")
+                self._runs = known.get("runs")
         elif record is not None:
             self._system = record
         self._keeper.fly(self._system, experiments)

@@ -10,10 +10,14 @@ from twinloop.controllers import Family
 from twinloop.controllers.custom import Law
 from twinloop.errors import InvalidInput
 from twinloop.guard.guard import Guard
+from twinloop.records import Record, Recorded
 from twinloop.signals import Signals
 from twinloop.systems.base import System
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+
+GUARDED = "guarded"
+"""Kind of the record of a system that is guarded: a command that reads it has no guard to fly it with."""
 
 
 class Guarded(System):
@@ -39,6 +43,16 @@ class Guarded(System):
     def signals(self) -> Signals:
         """Of the system."""
         return self.system.signals
+
+    @property
+    def runs(self) -> int:
+        """Runs that the system has made, if it counts them: the noise of its next one may depend on it."""
+        runs: int = getattr(self.system, "runs")  # noqa: B009 - a system need not declare it
+        return runs
+
+    @runs.setter
+    def runs(self, runs: int) -> None:
+        setattr(self.system, "runs", runs)  # noqa: B010 - a system need not declare it
 
     def run(self, test: Test) -> Trajectory:
         """Runs one experiment.
@@ -74,6 +88,27 @@ class Guarded(System):
             true_states=None if run.true_states is None else run.true_states[: steps + 1],
             band=None if run.band is None else run.band[:, : steps + 1],
         )
+
+
+def record_of(system: object) -> Record | None:
+    """The record of a system, which says whether it is guarded; None where it has none.
+
+    Args:
+        system: guarded or not.
+    """
+    if isinstance(system, Guarded):
+        record = record_of(system.system)
+        return None if record is None else {"kind": GUARDED, "version": 1, "system": record}
+    return system.to_record() if isinstance(system, Recorded) else None
+
+
+def unguarded(record: Record) -> Record:
+    """The record of a system by itself, guarded or not.
+
+    Args:
+        record: of a system.
+    """
+    return unguarded(record["system"]) if record["kind"] == GUARDED else record
 
 
 def led_by(law: Law, test: Test) -> Test:
