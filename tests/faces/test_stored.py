@@ -79,7 +79,7 @@ def test_a_campaign_on_a_system_of_ones_own_is_resumed_from_python(store, new_ca
     campaign.save(store)
     refused = run("resume", store)
     assert refused.exit_code == 2 and "from Python" in refused.stderr
-    assert "Experiments recorded: 1." in run("show", store).stdout
+    assert "Experiments recorded: 1 of 1." in run("show", store).stdout
 
 
 def test_an_interruption_says_how_to_go_on(store, monkeypatch):

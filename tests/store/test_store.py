@@ -18,6 +18,7 @@ import pytest
 from sqlalchemy import event
 
 import twinloop as tl
+from command import invoke
 from conftest import TINY
 from faults import exit_code_of, killed_and_resumed, telling, withdrawing
 from lives import (
@@ -348,6 +349,51 @@ def test_the_noise_of_a_system_that_counts_its_runs_goes_on_where_it_was(path):
         moved.close()
     assert system.runs == 3
     assert same([run.trajectory for run in moved.experiments], [run.trajectory for run in whole.experiments])
+
+
+def test_a_campaign_of_a_record_can_be_saved_and_counts_what_it_flies(path):
+    system = tl.systems.Quadrotor(noise=1e-3)
+    campaign = tl.Campaign(
+        system.signals, controller=system.controller, initial_state=system.initial_state,
+        target_state=system.target_state, duration=1.0, preset="paper", options=TINY, threads=1,
+    )  # fmt: skip
+    read = tl.Campaign.from_record(campaign.run(system, 1).to_record(), threads=1)
+    read.save(path)
+    read.run(system, 2).save(path)
+    # What a record does not say is not known.
+    assert [row[-1] for row in rows(path, "experiments")] == [None, 2]
+
+
+@pytest.mark.parametrize("first", [None, "hover.db"])
+def test_a_copy_of_a_campaign_flies_on_with_the_same_noise_and_knows_its_system(path, first):
+    """Whether it had a store of its own or none; also a copy that is brought up to date."""
+
+    def hover(where):
+        system = tl.systems.Quadrotor(noise=1e-3)
+        campaign = tl.Campaign(
+            system.signals, controller=system.controller, initial_state=system.initial_state,
+            target_state=system.target_state, duration=1.0, preset="paper", options=TINY, threads=1, store=where,
+        )  # fmt: skip
+        return system, campaign
+
+    copied = path.with_name("copy.db")
+    system, campaign = hover(None if first is None else path)
+    for experiments in (1, 2):
+        campaign.run(system, experiments)
+        campaign.save(copied)
+    campaign.close()
+    campaign.run(system, 3)
+    assert [row[-1] for row in rows(copied, "experiments")] == [1, 2]
+    with closing(opened(copied, read_only=True)) as store:
+        held = found(store, "campaign")
+    assert (held.system["noise"], held.experiments) == (1e-3, 2)
+    resumed = invoke("resume", str(copied), "--experiments", "3")
+    assert resumed.exit_code == 0, resumed.output
+    again = tl.Campaign.load(copied)
+    assert same(
+        [run.trajectory for run in again.experiments], [run.trajectory for run in campaign.experiments]
+    )
+    again.close()
 
 
 def test_another_system_than_the_one_that_was_flown_is_refused(path):
@@ -763,7 +809,7 @@ def test_whatever_is_kept_changes_the_state_also_within_a_second(path, pendulum,
         campaign._keeping._keeper.keep({}, campaign._method.to_record())
         look()
     for experiments in (2, 3):
-        campaign._keeping.fly(pendulum, experiments)
+        campaign._take_up(pendulum, experiments)
         look()
     assert len(set(seen)) == len(seen)
     campaign.close()

@@ -367,8 +367,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         """
         budget, allowed = checked_budget(self, system, experiments), checked_risk(max_risk)
         self.interrupted = False
-        if self._keeping is not None:
-            self._keeping.fly(system, budget)
+        self._take_up(system, budget)
         runs = len(self._book.experiments) + budget - self.runs
         with self._at_work(type(system).__name__, runs):
             fly(self, system, budget, timeout, allowed, self._report_experiment)

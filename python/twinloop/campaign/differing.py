@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from twinloop.errors import InvalidInput
+
 LONGEST = 60
 """Characters of a value that are shown."""
 MOST = 3
@@ -25,6 +27,24 @@ def differences(known: object, asked: object) -> str:
     found = list(_found(known, asked, ()))
     more = f"; and {len(found) - MOST} more" if len(found) > MOST else ""
     return "; ".join(found[:MOST]) + more
+
+
+def check_same(known: object, asked: object, what: str) -> None:
+    """Refuses another setup or system than the one that is known, and says where they differ.
+
+    Args:
+        known: plain form of what the store holds.
+        asked: the same of what is asked for.
+        what: was expected, as the beginning of a sentence.
+
+    Raises:
+        InvalidInput: they differ.
+    """
+    if known != asked:
+        raise InvalidInput(
+            f"{what}, found another: {differences(known, asked)}; use another store or another name, or the same"
+            " campaign file or arguments as before."
+        )
 
 
 def _found(known: Any, asked: Any, place: tuple[str, ...]) -> Iterator[str]:

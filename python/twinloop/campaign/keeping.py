@@ -8,20 +8,18 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from twinloop import _core
-from twinloop._ground.arrays import whole
 from twinloop._ground.texts import text, whole_characters
 from twinloop._ground.versions import versions
-from twinloop.campaign.differing import differences
+from twinloop.campaign.differing import check_same
 from twinloop.campaign.history import Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
 from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
-from twinloop.guard.guarded import record_of, unguarded
 from twinloop.records import Record
 from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened, shown_name
 
@@ -73,20 +71,18 @@ class Keeping:
             self.close()
             raise
         self.stored: Stored = held
-        self._runs: int | None = held.runs
-        self._system: Record | None = held.system
-        self._flown: object = None
         self._memory: object = None
         self._saved = time.monotonic()
         self._budget = held.experiments
         self._remaining = estimate(setup.options, held.experiments or 1)
 
-    def keep(self, book: Logbook, method: Method) -> None:
+    def keep(self, book: Logbook, method: Method, counts: Sequence[int | None]) -> None:
         """Commits what is new in the book, and what was learnt since.
 
         Args:
             book: of the campaign.
             method: of the campaign.
+            counts: how many runs its system had made at each recorded experiment.
 
         Raises:
             InvalidInput: an entry could not be read again.
@@ -96,7 +92,7 @@ class Keeping:
         record = None if memory is self._memory else method.to_record()
         entries = book.entries(self.rows)
         book.check_readable(entries)
-        self._keeper.keep(entries, record, self._count())
+        self._keeper.keep(entries, record, counts[self.rows["experiments"] :])
         self._memory, self._saved = memory, time.monotonic()
         self.rest()
 
@@ -141,35 +137,18 @@ class Keeping:
             with suppress(StoreFailure):
                 self._keeper.say(None)
 
-    def fly(self, system: object, experiments: int) -> None:
-        """Takes up a system where the campaign left it: one that counts its runs, as its noise depends on them.
+    def fly(self, system: Record | None, experiments: int) -> None:
+        """Commits what the campaign flies from now on.
 
         Args:
-            system: that will be run.
+            system: its record; None where it has none.
             experiments: runs on it in all.
 
         Raises:
-            InvalidInput: it is another one than the campaign has flown so far.
             StoreFailure: the store cannot be written.
         """
-        record = record_of(system)
-        if record is not None and self._system is not None:
-            what = f"Campaign.run, system: expected the one that {self.name} has flown so far"
-            known = unguarded(self._system)
-            _check_same({**known, "runs": None}, {**unguarded(record), "runs": None}, what)
-            if self._runs is None:
-                self._runs = known.get("runs")
-        elif record is not None:
-            self._system = record
-        self._keeper.fly(self._system, experiments)
+        self._keeper.fly(system, experiments)
         self._budget = experiments
-        runs = getattr(system, "runs", None)
-        if not isinstance(runs, int) or isinstance(runs, bool):
-            self._flown = None
-            return
-        if self._flown is None and self._runs is not None and runs < self._runs:
-            setattr(system, "runs", self._runs)  # noqa: B010 - a system need not declare it
-        self._flown = system
 
     @property
     def rows(self) -> dict[str, int]:
@@ -190,11 +169,6 @@ class Keeping:
         """Lets others write."""
         self.rest()
         self._keeper.close()
-
-    def _count(self) -> int | None:
-        if self._flown is not None:
-            self._runs = whole("System.runs", getattr(self._flown, "runs", None))
-        return self._runs
 
 
 def look(where: str | Path, name: str | None, read_only: bool) -> Stored:
@@ -320,19 +294,10 @@ def check_setup(known: Setup, asked: Setup, what: str) -> None:
     Raises:
         InvalidInput: they differ.
     """
-    _check_same(_stated(known.to_record()), _stated(asked.to_record()), what)
+    check_same(_stated(known.to_record()), _stated(asked.to_record()), what)
 
 
 def _stated(setup: Record) -> Record:
     """A setup with the length of a test as people state it, in s."""
     others = {key: value for key, value in setup.items() if key != "steps"}
     return {**others, "duration": round(setup["steps"] * setup["signals"]["dt"], 9)}
-
-
-def _check_same(known: Any, asked: Any, what: str) -> None:
-    """Refuses another setup or system than the one that is known, and says where they differ."""
-    if known != asked:
-        raise InvalidInput(
-            f"{what}, found another: {differences(known, asked)}; use another store or another name, or the same"
-            " campaign file or arguments as before."
-        )

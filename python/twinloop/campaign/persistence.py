@@ -20,6 +20,7 @@ from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
 from twinloop.campaign.own_progress import OwnProgress
 from twinloop.campaign.presets import Options
+from twinloop.campaign.rig import Rig
 from twinloop.campaign.setup import Setup
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput
@@ -55,6 +56,7 @@ class Persistent(Recorded):
         self._controller: Controller | None = None
         self._shown_twin: tuple[tuple[object, int], Twin] | None = None
         self._keeping: Keeping | None = None
+        self._rig = Rig()
 
     def _open(self, where: str | Path, name: str) -> None:
         """Goes on with what a store holds, and keeps there what comes."""
@@ -73,6 +75,7 @@ class Persistent(Recorded):
         self._book = Logbook.from_record(held.logbook, self.setup)
         if held.memory is not None:
             self._method.restore(held.memory, self._book)
+        self._rig = Rig(held.system, held.experiments, held.runs)
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -119,6 +122,7 @@ class Persistent(Recorded):
         campaign._begin(Setup.from_record(found["setup"]), threads, progress)
         campaign._book = Logbook.from_record(found["logbook"], campaign.setup)
         campaign._method.restore(found["memory"], campaign._book)
+        campaign._rig.count(len(campaign._book.recorded))
         return campaign
 
     def __copy__(self) -> Self:
@@ -136,6 +140,7 @@ class Persistent(Recorded):
         campaign._method.memory, campaign._controller = self._method.memory, None
         campaign._shown_twin = self._shown_twin
         campaign._keeping = None  # a store has one writer
+        campaign._rig = copy.copy(self._rig)
         return campaign
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
@@ -176,7 +181,9 @@ class Persistent(Recorded):
                     f"Campaign.save: expected {keeping.name} to be an earlier state of this one, found another"
                     " one, or one that has continued separately; choose another name."
                 )
-            keeping.keep(self._book, self._method)
+            keeping.keep(self._book, self._method, self._rig.counts)
+            if self._rig.budget is not None:
+                keeping.fly(self._rig.system, self._rig.budget)
         finally:
             keeping.close()
 
@@ -230,13 +237,20 @@ class Persistent(Recorded):
             self._keeping = None
 
     def _keep(self) -> None:
+        self._rig.count(len(self._book.recorded))
         if self._keeping is not None:
-            self._keeping.keep(self._book, self._method)
+            self._keeping.keep(self._book, self._method, self._rig.counts)
+
+    def _take_up(self, system: object, experiments: int) -> None:
+        """The system is the one that is flown from now on, for so many runs on it in all."""
+        self._rig.fly(system, experiments, None if self._keeping is None else self._keeping.name)
+        if self._keeping is not None:
+            self._keeping.fly(self._rig.system, experiments)
 
     @contextmanager
     def _entering(self) -> Iterator[None]:
         """What is entered in the book meanwhile is committed at the end, or taken back."""
-        book, memory = self._book.copied(), self._method.memory
+        book, memory, counts = self._book.copied(), self._method.memory, self._rig.counts
         rows = None if self._keeping is None else self._keeping.rows
         try:
             yield
@@ -244,7 +258,7 @@ class Persistent(Recorded):
         except BaseException:
             # Ctrl-C may come behind the commit: what the store holds stays.
             if self._keeping is None or self._keeping.rows == rows:
-                self._book, self._method.memory = book, memory
+                self._book, self._method.memory, self._rig.counts = book, memory, counts
             raise
 
     def _chosen(self) -> Method:

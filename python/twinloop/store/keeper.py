@@ -31,7 +31,7 @@ class Stored:
         logbook: its record.
         memory: its record; None where nothing was learnt.
         system: record of the system that it flies, where that has one.
-        runs: how many runs the system had made at the last experiment; None where it does not count.
+        runs: how many runs the system had made at each experiment; None where it does not count.
         experiments: that it will make in all, as was said last; None: nobody has said.
         created: when, in UTC.
         sessions: versions and processor each time it was opened to be written.
@@ -44,7 +44,7 @@ class Stored:
     logbook: Record
     memory: Record | None
     system: Record | None
-    runs: int | None
+    runs: tuple[int | None, ...]
     experiments: int | None
     created: str
     sessions: tuple[Record, ...]
@@ -127,7 +127,7 @@ def found(store: Store, name: str | None) -> Stored | None:
         logbook={"kind": "logbook", "version": 2, "identity": row.identity, **logbook},
         memory=None if memory is None else from_text(memory, what),
         system=None if row.system is None else from_text(row.system, what),
-        runs=runs[-1].runs if runs else None,
+        runs=tuple(run.runs for run in runs),
         experiments=row.experiments,
         created=row.created,
         sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
@@ -222,14 +222,17 @@ class Keeper:
         self._session = number
 
     def keep(
-        self, entries: Mapping[str, Sequence[Any]], memory: Record | None = None, runs: int | None = None
+        self,
+        entries: Mapping[str, Sequence[Any]],
+        memory: Record | None = None,
+        runs: Sequence[int | None] = (),
     ) -> None:
         """Commits what is new; either all of it is kept when this returns, or nothing.
 
         Args:
             entries: records that the lists of the logbook have in addition to `rows`.
             memory: what was learnt; None: as it was.
-            runs: how many runs the system has made; None where it does not count.
+            runs: how many runs the system had made at each of the new experiments; None where it does not count.
 
         Raises:
             StoreFailure: the database refuses, or holds other rows than were kept here.
@@ -246,11 +249,14 @@ class Keeper:
                     self._replace(connection, memory)
             self.rows = {name: count + len(entries.get(name, ())) for name, count in self.rows.items()}
 
-    def _append(self, connection: Connection, name: str, records: Sequence[Any], runs: int | None) -> None:
-        for number, record in enumerate(records, self.rows[name]):
+    def _append(
+        self, connection: Connection, name: str, records: Sequence[Any], runs: Sequence[int | None]
+    ) -> None:
+        first = self.rows[name]
+        for number, record in enumerate(records, first):
             row = {"campaign": self._id, "number": number, "record": to_text(record)}
             if name == "experiments":
-                row |= {"told": _now(), "sha256": _hash(str(row["record"])), "runs": runs}
+                row |= {"told": _now(), "sha256": _hash(str(row["record"])), "runs": runs[number - first]}
             if name == "withdrawals":
                 row["withdrawn"] = _now()
             connection.execute(_entries()[name].insert(), row)
