@@ -56,6 +56,7 @@ FRONTS = {
     "planning": "excitation gains gusts judging leaving planner proposal quality scored seen settings",
     "records": "reading",
     "reproduce": "command",
+    "store": "uninterrupted",
     "sweep": "command progress seeds workers",
     "systems": "base named patience quadrotor stepped",
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from twinloop._ground.arrays import share, whole
@@ -10,6 +11,7 @@ from twinloop._ground.texts import whole_characters
 from twinloop.campaign.assessment import latest_lesson
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.signals import Signals
+from twinloop.store.uninterrupted import uninterrupted
 from twinloop.systems import System
 from twinloop.systems.patience import run_within
 from twinloop.test import Test, check_signals
@@ -144,24 +146,54 @@ def _made(campaign: Campaign) -> Test | None:
 
 def _flown(campaign: Campaign, system: System, test: Test, timeout: float | None, again: bool) -> bool:
     """One run, entered with its result: whether the system failed, which it may not do `again`."""
+    landed: list[Trajectory] = []
     try:
-        trajectory = run_within(system, test, timeout)
-    except NoAnswer as failure:
+        _land(campaign, system, test, timeout, landed)
+        _record(campaign, test, landed)
+    except NoAnswer:
+        raise
+    except SystemFailure as failure:
+        campaign.tell_failed(test, whole_characters(str(failure)))
+        if again or not campaign.experiments:
+            raise
+        return True
+    except BaseException:
+        # Ctrl-C between the end of the flight and its record: the flight is what must not be lost.
+        _record(campaign, test, landed)
+        raise
+    return False
+
+
+def _land(
+    campaign: Campaign, system: System, test: Test, timeout: float | None, landed: list[Trajectory]
+) -> None:
+    """Flies a test. A flight that was cut short, or gave no answer, does not count in the system's `runs`."""
+    runs = getattr(system, "runs", None)
+    try:
+        run_within(system, test, timeout, landed)
+    except (KeyboardInterrupt, NoAnswer) as reason:
+        if not landed and getattr(system, "runs", None) != runs:
+            with suppress(AttributeError):  # one that nobody else may set
+                setattr(system, "runs", runs)  # noqa: B010 - a system need not declare it
+        if isinstance(reason, KeyboardInterrupt):
+            raise
         # As for what is too risky: without a store nothing outlasts this process.
         kept = (
             "The test still waits and nothing is lost: continue, or abandon the test."
             if campaign.store is not None
             else "The test waits no longer than this process lasts; a campaign in a store can be continued in another."
         )
-        raise NoAnswer(f"{failure} {kept}") from failure
-    except SystemFailure as failure:
-        campaign.tell_failed(test, whole_characters(str(failure)))
-        if again or not campaign.experiments:
-            raise
-        return True
-    if isinstance(trajectory, Trajectory) and trajectory.ended == "aborted" and trajectory.steps < 2:
-        # Ended before there was anything to learn from: that it was is the result.
-        campaign.tell_failed(test, trajectory.reason or "ended at once")
-    else:
-        campaign.tell(test, trajectory)
-    return False
+        raise NoAnswer(f"{reason} {kept}") from reason
+
+
+def _record(campaign: Campaign, test: Test, landed: list[Trajectory]) -> None:
+    """Enters what has landed, if it is not entered yet; Ctrl-C waits until it is."""
+    with uninterrupted():
+        if not landed:
+            return
+        trajectory = landed.pop()
+        if isinstance(trajectory, Trajectory) and trajectory.ended == "aborted" and trajectory.steps < 2:
+            # Ended before there was anything to learn from: that it was is the result.
+            campaign.tell_failed(test, trajectory.reason or "ended at once")
+        else:
+            campaign.tell(test, trajectory)
