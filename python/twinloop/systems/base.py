@@ -13,7 +13,8 @@ from twinloop.trajectory import Trajectory
 class System(Protocol):
     """A simulator, a rig, a robot. Subclass it, or write any class with these two members.
 
-    A system may also offer `default_gains`, a safe first controller, by name.
+    A system may also offer `default_gains`, a safe first controller, by name; and `stop()`, which ends a run that is
+    interrupted or given up while it is on a thread of its own.
     """
 
     @property
