@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from twinloop.campaign import Campaign
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import InvalidInput, NotTrusted, unknown
 from twinloop.faces.answering import answer, json_option
 from twinloop.law.exports.export import PRECISIONS, SUFFIXES
 from twinloop.law.twin import load_twin
@@ -59,7 +59,14 @@ def export(
     of_file = kind if output is not None else None
     if what == "twin":
         if file is not None and file.suffix == ".json":
-            made = load_twin(file).export(to, kind=of_file, precision=precision, force=force)
+            twin = load_twin(file)
+            against = [] if force else [remark.sentence for remark in twin.remarks if remark.serious]
+            if against:
+                raise NotTrusted(
+                    f"Export: expected a twin of which nothing serious is said, found: {' '.join(against)} Learn from"
+                    " more logs, or pass --force."
+                )
+            made = twin.export(to, kind=of_file, precision=precision, force=force)
         else:
             held = _campaign(source, name)
             made = held.export_twin(to, kind=of_file, precision=precision, force=force)

@@ -102,20 +102,20 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         """Multiple of a state's scale at which that is, as records have it."""
         return self._limits.divergence_factor
 
-    VERSION = 7
+    VERSION = 8
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
         """Names of the fields that a record has, in order."""
         return (
             *("signals", "model", "errors", "divergence_factor", "members", "noise", "seed", "inflation"),
-            *("flights", "follows"),
+            *("flights", "follows", "remarks"),
         )
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version, which told from the errors whether the twin follows."""
-        return {"follows": None, **super().renewed(record)}
+        """A record of an earlier version, which told from the errors whether the twin follows, and had no remarks."""
+        return {"follows": None, "remarks": [], **super().renewed(record)}
 
     @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Twin:
@@ -147,7 +147,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
             read(int, found["seed"], f"{where}.seed"),
             at_least_zero(f"Record {where}.inflation", found["inflation"]),
             read(tuple[Trajectory, ...], found["flights"], f"{where}.flights"),
-            follows=follows,
+            read(tuple[Remark, ...], found["remarks"], f"{where}.remarks"),
+            follows,
         )
         widths = {(flight.states.shape[1], flight.commands.shape[1]) for flight in twin.flights}
         noisy = twin.noise is None or len(twin.noise.sensors) == len(twin.noise.moves) == signals.n_x

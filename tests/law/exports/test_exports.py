@@ -33,6 +33,7 @@ from twinloop.law.exports.simulations import (
 from twinloop.law.exports.taking import compared
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.remarks import Remark
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 
@@ -488,6 +489,23 @@ def run(*arguments):
     return subprocess.run(
         [sys.executable, "-m", "twinloop", "export", *map(str, arguments)], capture_output=True, text=True
     )
+
+
+def test_what_speaks_against_a_twin_goes_with_its_file_and_keeps_it_there(tmp_path):
+    twin = TWINS["acceleration"]()
+    said = (
+        Remark("free-run", "serious", "It misses its flights."),
+        Remark("form", "note", "The form was searched."),
+    )
+    told = tl.Twin(twin.model, twin.signals, twin.errors, flights=twin.flights, remarks=said)
+    (path,) = told.export(tmp_path / "twin.json")
+    assert tl.load_twin(path).remarks == said
+    refused = run(path, "--to", "python")
+    assert refused.returncode == 1 and "found: It misses its flights. Learn" in refused.stderr
+    assert "def simulate(" in run(path, "--to", "python", "--force").stdout
+    # An earlier version wrote none.
+    record = {key: value for key, value in told.to_record().items() if key != "remarks"}
+    assert tl.Twin.from_record({**record, "version": 7}).remarks == ()
 
 
 def test_a_stored_campaign_is_taken_away_from_the_command_line(tmp_path, new_campaign, pendulum):
