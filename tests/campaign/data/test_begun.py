@@ -68,9 +68,21 @@ def test_it_is_said_and_no_prediction_is_held_against_it():
     it.tell(test, rig().run(replace(test, initial_state=np.array([0.5, 0.0]))))
     run = it.experiments[-1]
     said = [remark for remark in against(run, test, SIGNALS) if remark.code == "other-start"]
-    assert len(said) == 1 and "angle at 0.5 rad instead of 0 rad" in said[0].sentence
+    assert len(said) == 1 and said[0].serious and "angle at 0.5 rad instead of 0 rad" in said[0].sentence
     assert run.miss is None and misses(it.experiments) == []
-    assert "other-start" in {remark.code for remark in it.twin.remarks}
+    assert ("other-start", "note") in {(remark.code, remark.severity) for remark in it.twin.remarks}
     assert not [
         remark for remark in against(it.experiments[0], None, SIGNALS) if remark.code == "other-start"
     ]
+
+
+def test_a_flight_that_is_shorter_than_its_test_is_said_so_at_once():
+    it = campaign()
+    test = it.test(PENDULUM_GAINS)
+    whole = rig().run(test)
+    with pytest.warns(tl.RemarkWarning, match=r"has 12 of its 20 periods.* \(short-flight\)"):
+        it.tell(test, tl.Trajectory(whole.t[:13], whole.states[:13], whole.commands[:12]))
+    assert it.experiments[0].quality is None and not it.experiments[0].complete
+    aborted = tl.Trajectory(whole.t[:13], whole.states[:13], whole.commands[:12], "aborted", "a gust")
+    it.tell(test, aborted)
+    assert "short-flight" not in {remark.code for remark in against(it.experiments[1], test, SIGNALS)}

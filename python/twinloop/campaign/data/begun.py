@@ -1,15 +1,15 @@
-"""Begun: flights that began elsewhere than their tests do, of which nothing was predicted, and nothing compares."""
+"""Begun: flights that began elsewhere than their tests do, or ended before; nothing compares with their quality."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twinloop._ground.texts import in_unit
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.remarks import Remark, note
+from twinloop.remarks import Remark, note, serious
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -39,11 +39,14 @@ def off_start(test: Test, run: Trajectory) -> tuple[int, ...]:
     return tuple(np.flatnonzero(off > np.maximum(allowed, NOISE * noise)).tolist())
 
 
-def from_other_starts(experiments: Sequence[Experiment]) -> Iterator[Remark]:
+def from_other_starts(
+    experiments: Sequence[Experiment], say: Callable[[str, str], Remark] = note
+) -> Iterator[Remark]:
     """That flights began elsewhere than their tests.
 
     Args:
         experiments: as they count, in the order of `tell`.
+        say: makes a remark of a code and a sentence.
     """
     for run in experiments:
         if run.test is None or not run.off_start:
@@ -54,9 +57,24 @@ def from_other_starts(experiments: Sequence[Experiment]) -> Iterator[Remark]:
             f" instead of {in_unit(f'{start[i]:.4g}', signals.states[i].unit)}"
             for i in run.off_start
         )
-        yield note(
+        yield say(
             "other-start",
             f"The flight of test {run.test.number} began elsewhere than its test: {places}. It is learnt; what was"
             " predicted was not of it, and its quality compares with no other. Begin where the sheet says, or declare"
             " where flights begin.",
+        )
+
+
+def ended_early(flight: Experiment) -> Iterator[Remark]:
+    """That a flight is shorter than its test although nobody says that it was stopped.
+
+    Args:
+        flight: that was recorded.
+    """
+    steps = flight.trajectory.steps
+    if flight.test is not None and flight.trajectory.ended == "completed" and steps < flight.test.steps:
+        yield serious(
+            "short-flight",
+            f"The flight of test {flight.test.number} has {steps} of its {flight.test.steps} periods: it is learnt, and"
+            " has no quality. Tell the whole record, or that it was aborted, and why.",
         )
