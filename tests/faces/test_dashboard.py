@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from command import hearing_ctrl_c
+from command import hearing_ctrl_c, invoke
 from conftest import PENDULUM_GAINS
 from dashboards import begun, call, flight, look, served
 from lives import PLANT, stored
@@ -24,6 +25,7 @@ pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.faces.dashboard import app, desk
 from twinloop.faces.dashboard.command import prepared
+from twinloop.logs import write_columns
 
 HOSTILE = "<script>alert(1)</script> & ../../etc"
 
@@ -80,6 +82,36 @@ def test_what_went_wrong_is_told(store, tmp_path):
         words = json.dumps({"reason": "the motor cut out"})
         assert call(address, "POST", f"/c/1/tests/{asked.number}/failed", words)[0] == 200
     assert [failure.reason for failure in look(store).failures] == ["the motor cut out"]
+
+
+def test_what_speaks_against_a_flight_is_said_as_the_commands_say_it(store, tmp_path):
+    """The torque of test 1 with its sign exchanged is none that its controller gives; a part counts twice."""
+    test = look(store).tests[1]
+    flew = PLANT.run(test)
+    columns = {
+        "t": flew.t,
+        "angle": flew.states[:, 0],
+        "rate": flew.states[:, 1],
+        "torque": -flew.commands[:, 0],
+    }
+    write_columns(tmp_path / "flight.csv", columns)
+    copy = tmp_path / "copy.db"
+    shutil.copy(store, copy)
+    part = flight(tmp_path / "part.csv", look(store).tests[0], steps=10)
+    with served(store) as address:
+        flown = (tmp_path / "flight.csv").read_bytes()
+        status, _, told = call(address, "POST", "/c/1/tests/1/log?file=flight.csv", flown)
+        assert status == 200
+        status, _, attached = call(address, "POST", "/c/1/log?file=part.csv", part)
+        assert status == 200
+    for answer, typed, sentence in (
+        (told, ("tell", str(copy), "1", str(tmp_path / "flight.csv")), "none that its controller gives"),
+        (attached, ("attach", str(copy), str(tmp_path / "part.csv")), "so that they count twice"),
+    ):
+        lines = json.loads(answer)["said"].splitlines()[1:]
+        printed = invoke(*typed).stderr.replace("copy.db", "hover.db").splitlines()
+        assert lines == [line for line in printed if line.startswith("Against this flight: ")]
+        assert any(sentence in line for line in lines)
 
 
 def test_a_log_that_was_told_is_not_told_twice(store, tmp_path):

@@ -13,8 +13,6 @@ from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
-from twinloop.campaign.examination.log_check import against
-from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.cautions import serious_of
@@ -22,10 +20,10 @@ from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
+from twinloop.faces.telling import against_it, counted, numbered, tell_failed
 from twinloop.faces.telling import attach as attach_flight
-from twinloop.faces.telling import counted, numbered, tell_failed, told_twice
 from twinloop.faces.telling import tell as tell_flight
-from twinloop.logs import Log, write_columns
+from twinloop.logs import write_columns
 from twinloop.planning.quality import quality_unit
 from twinloop.store import shown_name
 from twinloop.test import Test
@@ -150,7 +148,7 @@ def tell(
             "spread": asked.spread,
             "quality": runs[-1].quality if runs else None,
         }
-        remarks = [] if read is None else _against(campaign, runs[-1], asked, read)
+        remarks = [] if read is None else against_it(campaign, runs[-1], asked, read)
         answer({**_standing(campaign, asked), **quality, "remarks": remarks}, text, as_json)
         _say(remarks)
 
@@ -203,7 +201,7 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
     with closing(_campaign(store)) as campaign:
         read = attach_flight(campaign, flight)
         text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
-        remarks = _against(campaign, campaign.experiments[-1], None, read)
+        remarks = against_it(campaign, campaign.experiments[-1], None, read)
         answer(
             {"file": str(flight), "experiments": len(campaign.experiments), "remarks": remarks}, text, as_json
         )
@@ -221,12 +219,6 @@ def abandon(store: str, test: int, as_json: bool) -> None:
         campaign.abandon(asked)
         text = f"Saved: test {test} abandoned in {shown_name(store)}."
         answer(_standing(campaign, asked), text, as_json)
-
-
-def _against(campaign: Campaign, flight: Experiment, asked: Test | None, read: Log) -> list[str]:
-    """What speaks against a flight that was told."""
-    found = against(flight, asked, campaign.signals, read.lines)
-    return [*(remark.sentence for remark in found), *told_twice(campaign, flight, asked)]
 
 
 def _say(remarks: Sequence[str]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
+from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput
 from twinloop.logs import Log, read_log
@@ -163,14 +164,21 @@ def tell_failed(
     return test, found
 
 
-def told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> list[str]:
-    """That a flight is the beginning of another record, or the other way round: a sentence for each of them.
+def against_it(campaign: Campaign, flight: Experiment, test: Test | None, read: Log) -> list[str]:
+    """What speaks against a flight that was told or attached: said at once, while somebody can still look at the rig.
 
     Args:
         campaign: that it was recorded in.
         flight: one of its experiments.
-        test: of the flight; None: it was attached.
+        test: of the flight, as it was asked for; None: it was attached.
+        read: its log.
     """
+    found = against(flight, test, campaign.signals, read.lines)
+    return [*(remark.sentence for remark in found), *_told_twice(campaign, flight, test)]
+
+
+def _told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> list[str]:
+    """That a flight is the beginning of another record, or the other way round: a sentence for each of them."""
     run, said = flight.trajectory, []
     for other in campaign.experiments:
         if other is flight or (test is not None and _again(other.test, test)):

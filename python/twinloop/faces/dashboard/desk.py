@@ -8,10 +8,12 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from twinloop.campaign import Campaign
+from twinloop.campaign.history import Experiment
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
-from twinloop.faces.telling import attach, counted, numbered, tell, tell_failed
+from twinloop.faces.telling import against_it, attach, counted, numbered, tell, tell_failed
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
+from twinloop.logs import Log
 from twinloop.store import Doing, approve, approved, doing, is_address, listed, opened, shown_name, state
 from twinloop.test import Test
 
@@ -105,7 +107,7 @@ class Desk:
         return f"Test {number} may be flown."
 
     def tell(self, name: str, number: int, log: Path, called: str, aborted: str) -> str:
-        """Tells the flight of a test.
+        """Tells the flight of a test; the answer says also what speaks against it, a line for each reason.
 
         Args:
             name: of the campaign.
@@ -120,11 +122,13 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            tell(campaign, number, log, aborted=aborted, name=called)
-            return f"Test {number} recorded: {len(campaign.experiments)} experiments are stored."
+            asked, read = tell(campaign, number, log, aborted=aborted, name=called)
+            flight = [run for run in campaign.experiments if run.number == asked.number][-1]
+            said = f"Test {number} recorded: {len(campaign.experiments)} experiments are stored."
+            return "\n".join([said, *_against(campaign, flight, asked, read)])
 
     def attach(self, name: str, log: Path, called: str) -> str:
-        """Attaches a flight without a test.
+        """Attaches a flight without a test; the answer says also what speaks against it, a line for each reason.
 
         Args:
             name: of the campaign.
@@ -136,8 +140,9 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            attach(campaign, log, name=called)
-            return f"Attached: {len(campaign.experiments)} experiments are stored."
+            read = attach(campaign, log, name=called)
+            said = f"Attached: {len(campaign.experiments)} experiments are stored."
+            return "\n".join([said, *_against(campaign, campaign.experiments[-1], None, read)])
 
     def fail(self, name: str, number: int, reason: str) -> str:
         """Tells that a test failed.
@@ -269,6 +274,10 @@ def unlearnt(campaign: Campaign) -> str:
     if count <= 0:
         return ""
     return f"Not learnt yet: {count} experiment{'' if count == 1 else 's'}; to learn now, plan the next test."
+
+
+def _against(campaign: Campaign, flight: Experiment, asked: Test | None, read: Log) -> list[str]:
+    return [f"Against this flight: {sentence}" for sentence in against_it(campaign, flight, asked, read)]
 
 
 def in_words(seen: Doing) -> str:
