@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 import twinloop as tl
 from command import invoke
 from lives import RIG
+from twinloop.logs import read_log
 from ulogs import MAGIC, message, ulog
 
 pytest.importorskip("pyulog", reason="twinloop[ulog] is not installed")
@@ -200,6 +201,29 @@ def test_a_heading_that_wraps_between_two_samples_goes_on(tmp_path, unit, turn):
     columns = {"yaw": "position.heading", "aileron": "actuator.control[0]"}
     run = tl.load(written(tmp_path, ulog(formats, sorted(samples + sent))), signals, columns=columns)
     np.testing.assert_allclose(run.states[:, 0], heading(run.t), atol=1e-3 * turn)
+
+
+@pytest.mark.parametrize("field", ["vehicle_attitude.roll", "heading.roll"])
+def test_samples_that_are_no_numbers_are_missing_alone(tmp_path, field):
+    """Two samples of 5 ms touch one row of 20 ms at most; behind them the angle goes on as if they were there."""
+    formats = FORMATS | {"heading": "uint64_t timestamp;double roll;"}
+    lost = (1.0, 1.01)
+    samples = [
+        (at, topic, instance, [np.nan] * len(values) if lost[0] < at < lost[1] and topic in field else values)
+        for at, topic, instance, values in rows()
+    ]
+    for k in range(400):
+        at = 0.005 * k
+        wrapped = (roll(at) + np.pi) % (2.0 * np.pi) - np.pi
+        samples.append((at, "heading", 0, [np.nan if lost[0] < at < lost[1] else wrapped]))
+    signals = tl.Signals([SIGNALS.states[0]], SIGNALS.commands, dt=0.02)
+    columns = {"roll": field, "aileron": COLUMNS["aileron"]}
+    found = read_log(
+        written(tmp_path, ulog(formats, sorted(samples, key=lambda row: row[0]))), signals, columns=columns
+    )
+    missing = np.isnan(found.states[:, 0])
+    assert 0 < missing.sum() <= 2
+    np.testing.assert_allclose(found.states[~missing, 0], roll(0.004 + found.t[~missing]), atol=1e-6)
 
 
 def bomb():

@@ -247,7 +247,15 @@ def _angle(name: str, w: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
         angle = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     else:
         angle = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return np.asarray(np.round(np.unwrap(angle), 12))
+    return np.round(_without_jumps(angle, 2.0 * np.pi), 12)
+
+
+def _without_jumps(values: Floats, turn: float) -> Floats:
+    """Values that take the short way from one to the next; one that is no number changes none behind it."""
+    found = values.copy()
+    known = np.isfinite(values)
+    found[known] = np.unwrap(values[known], period=turn)
+    return found
 
 
 def _common(called: str, found: Sequence[_Samples], window: Window, dt: float) -> tuple[float, float]:
@@ -278,7 +286,7 @@ def _refuse_gaps(called: str, samples: _Samples, start: float, stop: float, dt: 
 def _interpolated(samples: _Samples, state: State, times: Floats) -> Floats:
     """Values between samples; of an angle that wraps between two of them by the short way, so that it jumps nowhere."""
     turn = state.period or TURNS.get(state.unit)
-    values = samples.values if turn is None else np.unwrap(samples.values, period=turn)
+    values = samples.values if turn is None else _without_jumps(samples.values, turn)
     return np.asarray(np.interp(times, samples.times, values))
 
 
