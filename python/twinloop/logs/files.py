@@ -87,9 +87,9 @@ def load(
     """A recorded flight from a file.
 
     A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order; other
-    columns are ignored, states that are not measured may be missing, and the commands of the last row may be empty. A
-    file of NumPy (`.npz`) has arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u),
-    whose last row is ignored.
+    columns are ignored, states that are not measured may be missing, and the commands of the last row may be empty. If
+    the file ends within a row, at a number that may be a part of one, it is refused. A file of NumPy (`.npz`) has
+    arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), whose last row is ignored.
 
     A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with its own times. They are resampled to the
     period of the signals: states are interpolated between two samples, and each command is the last one sent. If two
@@ -284,6 +284,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         )
     body = rows[1:]
     _refuse_longer(body, len(names), called)
+    if body and _goes_on(text):
+        _refuse_cut(*body[-1], names, (TIME, *states_read), called)
 
     def column(name: str, count: int) -> list[float]:
         place = names.index(name)
@@ -305,6 +307,27 @@ def _refuse_longer(body: Sequence[tuple[int, Sequence[str]]], columns: int, call
                 f"Log {called}, line {line}: expected {columns} cells, one for each column, found {len(row)}; write"
                 " decimals with a point, and one number in a cell."
             )
+
+
+def _goes_on(text: str) -> bool:
+    """Whether the last line of a text has no end."""
+    return bool(text[max(text.rfind("\n"), text.rfind("\r")) + 1 :].strip())
+
+
+def _refuse_cut(
+    line: int, row: Sequence[str], names: Sequence[str], needed: Sequence[str], called: str
+) -> None:
+    """Refuses a last row that may end within a number that is needed: behind a whole one stands a comma or a line end.
+
+    In a row of all cells nothing tells a cut number from a whole one, and many programs write no last line end.
+    """
+    last = len(row) - 1
+    if last + 1 < len(names) and names[last] in needed and row[last].strip():
+        raise InvalidInput(
+            f"Log {called}, line {line}: expected {len(names)} cells or the end of the line, found that the file"
+            f" ends at {row[last].strip()!r}, which may be a part of {names[last]}; remove this row, or end the line if"
+            " the number is whole."
+        )
 
 
 def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -> float:
