@@ -145,6 +145,23 @@ def test_a_flight_without_its_excitation_is_noticed_at_once(folder):
     assert f"Against this flight: {remark}" in told.stderr
 
 
+@pytest.mark.parametrize(("share", "said"), [(1.0, True), (0.4, False)])
+@pytest.mark.parametrize("typed", [("tell", "rig.db", "0"), ("attach", "rig.db")], ids=["tell", "attach"])
+def test_a_flight_that_was_outside_the_envelope_most_of_the_time_is_noticed_at_once(
+    folder, typed, share, said
+):
+    """An offset of a turn and a half, as in K for degC; a flight that was outside for less than half of it may be."""
+    run("ask", "rig.db")
+    good = flown(look().tests[0])
+    off = 9.0 * (np.arange(len(good.t)) < share * len(good.t))
+    log = {"t": good.t, "angle": good.states[:, 0] + off, "rate": good.states[:, 1]}
+    write_columns(folder / "flight.csv", {**log, "torque": good.commands[:, 0]})
+    told = run(*typed, "flight.csv")
+    assert told.exit_code == 0, told.stderr
+    sentence = "Against this flight: angle was outside its envelope in 100 % of the rows"
+    assert (sentence in told.stderr) == ("outside its envelope" in told.stderr) == said
+
+
 def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder):
     run("ask", "rig.db")
     early = run("learn", "rig.db")

@@ -78,6 +78,7 @@ FAULTS = {
     "derivative": (changed("rate", lambda x: -x), "declared derivative"),
     "scale": (changed("angle", lambda x: 1e3 * x), "check its unit"),
     "beyond-bounds": (changed("torque", lambda u: 100.0 * u), "beyond its bounds"),
+    "envelope": (changed("rate", lambda x: x + 25.0), "outside its envelope in 100 % of the rows"),
     "short": (without(range(2, 121)), "2 rows"),
 }
 

@@ -39,6 +39,8 @@ MOVED = 3.0
 """Standard deviations of its noise, as guessed from above, that a state must have moved for anything to be learnt."""
 SATURATED = 0.5
 """Share of the rows at a bound above which a command says little."""
+OUTSIDE = 0.5
+"""Share of the rows outside the envelope above which a unit or an offset is more likely than a flight that left it."""
 SMALL = 1e-3
 """Share of its scale within which a state that moved may be in another unit."""
 
@@ -318,9 +320,15 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
             " it; excite it more.",
         )
     if column.beyond:
-        yield note(
-            "envelope", f"{name} was outside its envelope in {100.0 * column.beyond:.3g} % of the rows."
-        )
+        said = f"{name} was outside its envelope in {100.0 * column.beyond:.3g} % of the rows"
+        if column.beyond <= OUTSIDE:
+            yield note("envelope", f"{said}.")
+        else:
+            yield serious(
+                "envelope",
+                f"{said} ({in_unit(f'{column.least:g} to {column.greatest:g}', column.unit)}): check its unit and its"
+                " offset. If it truly was there, cut the log where it left the envelope, or declare a wider one.",
+            )
 
 
 def _of_scales(states: Floats, signals: Signals) -> Iterator[Remark]:
