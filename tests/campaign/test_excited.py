@@ -113,6 +113,36 @@ def test_a_program_that_adds_the_excitation_to_commands_that_have_it_is_seen(tes
     assert seen(flight) is Excited.TWICE and other_commands([flight]) == []
 
 
+def saturated(asked):
+    """A flight far from its target: whatever a program adds before the bounds clip, the torque stays at its bound."""
+    rows = np.arange(asked.steps + 1)
+    states = np.column_stack([asked.target_state[0] - 8.0 + 0.01 * rows, np.full(len(rows), 0.2)])
+    run = tl.Trajectory(SIGNALS.dt * rows, states, np.full((asked.steps, 1), TORQUE[1]))
+    own = dataclasses.replace(asked, initial_state=states[0], hold_back=None, predicted=1.0)
+    return SimpleNamespace(test=own, replayed=own, number=own.number, trajectory=run)
+
+
+def test_what_bounds_hide_was_not_left_out(test):
+    flight = saturated(test)
+    (said,) = [each for each in against(flight, flight.test, SIGNALS) if each.code == "excitation"]
+    assert said.sentence.startswith(
+        "Nothing is seen of the excitation of test 0: the commands were at their bounds"
+    )
+    assert other_commands([flight]) == []
+
+
+def test_a_flight_whose_excitation_is_hidden_counts_as_it_was_asked_for(tmp_path):
+    file = tmp_path / "rig.toml"
+    file.write_text(template("rig.db"), encoding="utf-8")
+    campaign = read_file(file).campaign(threads=1)
+    flight = saturated(campaign.test(read_file(file).first))
+    campaign._book.tests[0] = flight.test
+    campaign.tell(flight.test, flight.trajectory)
+    (run,) = campaign.experiments
+    assert run.test.excitation is None and run.test.predicted == 1.0  # replayed as sent, with its prediction
+    assert "Test 0: Gains of your own, gently excited." in str(campaign)
+
+
 def test_a_test_without_an_excitation_has_none_that_could_be_left_out(test):
     flight = flown(test.quiet())
     assert seen(flight) is Excited.HELD_BACK and codes(flight) == []

@@ -22,6 +22,9 @@ late is never further off than this: |e(t - d) - e(t)|² is at most 4 |e|² on a
 SEEN = 0.005
 """Share of their bounds by which commands are off at least before another excitation is looked for."""
 
+AT_BOUND = 1e-9
+"""Share of their bounds within which commands are at one."""
+
 
 class Excited(Enum):
     """How the excitation of a test was flown."""
@@ -48,6 +51,28 @@ def excited(test: Test, run: Trajectory) -> Excited:
     off = {how: _off(as_excited(test, how), run) for how in others}
     best = min(off, key=lambda how: off[how])
     return best if off[best] < BETTER * asked else Excited.HELD_BACK
+
+
+def hidden(test: Test, run: Trajectory) -> bool:
+    """Whether bounds hide the excitation of a test that seems to be left out: it may have been added all the same.
+
+    A program may add it to a command before the bounds clip the sum. Where the controller alone is at a bound, and the
+    recorded command too, nothing tells the two apart.
+
+    Args:
+        test: as it was asked for.
+        run: that was recorded of it.
+    """
+    if excited(test, run) is not Excited.NOT:
+        return False
+    quiet = given(test.quiet(), run.states)
+    low, high = np.array([command.bounds for command in test.family.signals.commands]).T
+    near = AT_BOUND * (high - low)
+    held = (np.maximum(quiet, run.commands) <= low + near) | (np.minimum(quiet, run.commands) >= high - near)
+    sent = np.where(held, quiet, run.commands)
+    asked = np.where(held, quiet, given(test, run.states))
+    off = float(apart(sent, asked, test).mean())
+    return off <= SEEN * SEEN or float(apart(sent, quiet, test).mean()) >= BETTER * off
 
 
 def as_excited(test: Test, how: Excited) -> Test:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from twinloop._ground.texts import text
 from twinloop.campaign.data.gains import flown_otherwise
-from twinloop.campaign.excited import as_excited, excited
+from twinloop.campaign.excited import as_excited, excited, hidden
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
@@ -70,9 +70,11 @@ def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal],
             return replace(run, replayed=otherwise, before=None, final_distance=None, quality=None)
     if test is not None:
         flown = as_excited(test, excited(test, run.trajectory))
+        as_asked = flown is test or hidden(test, run.trajectory)
         # Of what was not asked for nothing was predicted.
-        if flown is not test or any(test.number in each.planned for each in withdrawals):
-            run = replace(run, replayed=replace(flown, predicted=None, spread=None, risk=None))
+        if not as_asked or any(test.number in each.planned for each in withdrawals):
+            flown = replace(flown, predicted=None, spread=None, risk=None)
+        run = run if flown is test else replace(run, replayed=flown)
     if any(
         each.planned and each.run is not None and each.run < place < each.recorded for each in withdrawals
     ):

@@ -21,6 +21,7 @@ from twinloop.campaign.assessment import (
 from twinloop.campaign.cost import Cost
 from twinloop.campaign.examination.beside import Beside
 from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.excited import hidden
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
@@ -71,7 +72,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "commands": [dataclasses.asdict(command) for command in campaign.signals.commands],
         },
         "experiments": [
-            {**_experiment(each.run, row, identified), "series": _series(each, foretold.get(place))}
+            {**_experiment(campaign, each.run, row, identified), "series": _series(each, foretold.get(place))}
             for place, (each, row) in enumerate(zip(found.beside, twin.errors, strict=True))
         ],
         "iterations": [dataclasses.asdict(iteration) for iteration in campaign.history],
@@ -171,8 +172,9 @@ def _first_controller(campaign: Campaign, twin: Twin, identified: bool) -> dict[
     return None
 
 
-def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:
+def _experiment(campaign: Campaign, run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:
     test = run.test
+    asked = None if test is None or test.number is None else campaign.tests[test.number]
     found: dict[str, object] = {
         "test": run.number,
         "gains": None if test is None else test.parameters,
@@ -190,7 +192,8 @@ def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str,
             "predicted_minus_measured": run.miss,
             "risk": None if test is None else test.risk,
             "why": "" if test is None else test.reason,
-            "excited": test is not None and test.excitation is not None,
+            "excited": test is not None
+            and (test.excitation is not None or (asked is not None and hidden(asked, run.trajectory))),
             "final_distance": run.final_distance,
             "normalised_before": run.normalised_before,
         }

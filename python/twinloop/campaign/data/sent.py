@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.excited import Excited, apart, as_excited, excited, given, span_of
+from twinloop.campaign.excited import Excited, apart, as_excited, excited, given, hidden, span_of
 from twinloop.campaign.history import Experiment
 from twinloop.remarks import Remark, note, serious
 from twinloop.test import Test
@@ -70,30 +70,37 @@ def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) 
         )
 
 
-def from_another_excitation(test: int, how: Excited) -> Iterator[Remark]:
-    """That the excitation of a test was not flown, not held back, or flown twice.
+def from_another_excitation(test: Test, run: Trajectory) -> Iterator[Remark]:
+    """That the excitation of a test was not flown, not held back, or flown twice, by the recorded commands.
 
     Args:
-        test: its number.
-        how: its excitation was flown, by the recorded commands.
+        test: as it was asked for.
+        run: that was recorded of it.
     """
-    if how is Excited.NOT:
+    how, it = excited(test, run), f"The excitation of test {test.number}"
+    if how is Excited.NOT and hidden(test, run):
         yield note(
             "excitation",
-            f"The excitation of test {test} was not added to the commands: this flight tells less. The test sheet says"
+            f"Nothing is seen of the excitation of test {test.number}: the commands were at their bounds where it was"
+            " added. This flight tells less; a target that needs smaller commands leaves room for it.",
+        )
+    elif how is Excited.NOT:
+        yield note(
+            "excitation",
+            f"{it} was not added to the commands: this flight tells less. The test sheet says"
             " where it is and how to add it.",
         )
     elif how is Excited.WHOLE:
         yield serious(
             "excitation",
-            f"The excitation of test {test} was flown without holding it back: such a flight may lead further than its"
+            f"{it} was flown without holding it back: such a flight may lead further than its"
             " sheet says. Scale it by the readings, as the sheet tells; for a program that cannot do this, set"
             " hold_back = false under [options] and begin a new campaign: then the excitation stays small.",
         )
     elif how is Excited.TWICE:
         yield serious(
             "excitation",
-            f"The excitation of test {test} was flown twice as strong: such a flight may lead further than its sheet"
+            f"{it} was flown twice as strong: such a flight may lead further than its sheet"
             " says. The commands of test.controller() have it already: send them as they are.",
         )
 

@@ -23,7 +23,6 @@ from twinloop.campaign.data.sent import (
 )
 from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.examination.told_apart import alike
-from twinloop.campaign.excited import excited
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, in_file, row_name
 from twinloop.identification.records import Run, guessed_noise
@@ -179,7 +178,7 @@ def against(
     names = [signals.commands[i].name for i in pair or ()]
     if isinstance(flight.replayed, FlownOtherwise):
         asked = flight.replayed.flown
-    excitations = () if asked is None else from_another_excitation(asked.number, excited(asked, run))
+    excitations = () if asked is None else from_another_excitation(asked, run)
     return [
         *(each for each in found if each.serious),
         *from_other_controllers(others, names),
