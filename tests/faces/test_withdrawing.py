@@ -132,3 +132,19 @@ def test_a_test_with_a_flight_has_not_failed_until_that_is_withdrawn(flights):
     withdrawn("0")
     assert run("tell", "rig.db", "0", "--failed", "oops").exit_code == 0
     assert look().status(look().tests[0]) == "failed"
+
+
+def test_a_wrong_log_that_was_told_after_a_failure_is_taken_back_and_then_the_failure(flights):
+    assert withdrawn("0").exit_code == 0
+    assert run("tell", "rig.db", "0", "--failed", "the motor cut out").exit_code == 0
+    assert run("tell", "rig.db", "0", "flight0.csv").exit_code == 0
+    said = withdrawn("0").stdout
+    assert "Saved: the flight of test 0 withdrawn; 1 experiment in rig.db." in said
+    assert "Still recorded of test 0: its failure: the motor cut out." in said
+    assert "twinloop withdraw rig.db 0 --reason WHY" in said
+    campaign = look()
+    assert [each.reason for each in campaign.failures] == ["the motor cut out"]
+    assert not [each for each in campaign.experiments if each.number == 0]
+    said = withdrawn("0").stdout
+    assert "Saved: the failure of test 0 withdrawn" in said and "Still recorded" not in said
+    assert look().failures == () and look().status(look().tests[0]) == "asked"

@@ -301,7 +301,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
         counts no more.
 
         Args:
-            which: number of the test, or the test: its failure, or its last run; or one of `experiments` or `failures`.
+            which: number of the test, or the test: its last run, or its failure if it has no run; or one of
+                `experiments` or `failures`.
             reason: what was wrong with the flight, in a few words.
 
         Raises:

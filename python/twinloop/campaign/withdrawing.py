@@ -128,12 +128,15 @@ def _place(book: Logbook, which: object) -> Place:
 
 
 def _of_test(book: Logbook, number: int) -> Place:
-    """The failure of a test, or the run that was told last."""
+    """The run of a test that was told last, with the failure whose record it is; the last failure if there is no run.
+
+    The book has no order of both. `tell --failed` refuses a test with a flight: there a failure comes first.
+    """
     runs, failures = _counting(book)
-    failed = [place for place in failures if book.reported[place].test.number == number]
-    if failed:
-        return _of_failure(book, book.reported[failed[-1]])
     told = [place for place in runs if book.recorded[place].number == number]
+    failed = [place for place in failures if book.reported[place].test.number == number]
+    if failed and not told:
+        return _of_failure(book, book.reported[failed[-1]])
     if not told:
         told_of = sorted(book.flown)
         of = f"one of {', '.join(map(str, told_of))}" if told_of else "a flight that was told"
@@ -141,7 +144,7 @@ def _of_test(book: Logbook, number: int) -> Place:
             f"Campaign.withdraw: expected the number of a test with a recorded flight, {of}, found {number};"
             " there is nothing to withdraw."
         )
-    return told[-1], None
+    return told[-1], _failure_of(book, book.recorded[told[-1]])
 
 
 def _of_failure(book: Logbook, failure: Failure) -> Place:
@@ -158,7 +161,7 @@ def _of_failure(book: Logbook, failure: Failure) -> Place:
 
 
 def _of_experiment(book: Logbook, run: Experiment) -> Place:
-    runs, failures = _counting(book)
+    runs, _ = _counting(book)
     counted = list(zip(runs, book.experiments, strict=True))
     itself = [place for place, each in counted if each is run]
     places = itself or [
@@ -170,12 +173,17 @@ def _of_experiment(book: Logbook, run: Experiment) -> Place:
         raise InvalidInput(
             "Campaign.withdraw: expected one of campaign.experiments, found another one, or a withdrawn one."
         )
+    return places[0], _failure_of(book, run)
+
+
+def _failure_of(book: Logbook, run: Experiment) -> int | None:
+    """The failure whose record a run is; None: it is that of none."""
     of = [
         place
-        for place in failures
+        for place in _counting(book)[1]
         if book.reported[place].recorded and _is_record_of(run, book.reported[place])
     ]
-    return places[0], (of[-1] if of else None)
+    return of[-1] if of else None
 
 
 def _is_record_of(run: Experiment, failure: Failure) -> bool:

@@ -170,7 +170,7 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
         "failed": [failure.test.number for failure in campaign.failures],
         "abandoned": [test.number for test in campaign.tests if campaign.status(test) == "abandoned"],
         "withdrawn": [
-            {"test": each.test, "reason": each.reason, "at": at}
+            {"test": each.test, "what": named(each), "reason": each.reason, "at": at}
             for each, at in zip(campaign.withdrawals, held.withdrawn_at, strict=False)
         ],
         "sessions": list(held.sessions),
@@ -195,7 +195,7 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
             numbers = ", ".join(str(number) for number in facts[key])
             lines.append(f"Test{'s' if len(facts[key]) > 1 else ''} {words}: {numbers}.")
     for each in facts["withdrawn"]:
-        lines.append(f"Withdrawn at {each['at']}: {named(each['test'])} ({each['reason']}).")
+        lines.append(f"Withdrawn at {each['at']}: {each['what']} ({each['reason']}).")
     return "\n".join(lines) + "\n"
 
 

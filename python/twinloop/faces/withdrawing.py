@@ -11,7 +11,7 @@ import click
 
 from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
-from twinloop.campaign.history import Experiment
+from twinloop.campaign.history import Experiment, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.telling import counted
@@ -42,17 +42,20 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
         campaign.withdraw(chosen(campaign, which), reason)
         test = campaign.withdrawals[-1].test
         others = [run for run in campaign.experiments if test is not None and run.number == test]
+        failures = [each for each in campaign.failures if each.test.number == test and not each.recorded]
         facts = {
             "test": test, "reason": reason, "abandoned": given_up(campaign), "experiments": len(campaign.experiments),
         }  # fmt: skip
         shown = shown_name(store)
         which_one = _which(campaign, before) if others else ""
         lines = [
-            f"Saved: {named(test)}{which_one} withdrawn; {counted(campaign)} in {shown}.",
+            f"Saved: {named(campaign.withdrawals[-1])}{which_one} withdrawn; {counted(campaign)} in {shown}.",
             *given_up_words(campaign),
         ]
-        if others:
-            lines.append(f"Still recorded of test {test}: {', '.join(map(_described, others))}.")
+        if others or failures:
+            left = [*map(_described, others), *(f"its failure: {each.reason}" for each in failures)]
+            again = to_type("withdraw", shown, test, "--reason", "WHY")
+            lines.append(f"Still recorded of test {test}: {', '.join(left)}. To take it back, too: {again}")
         elif test is not None:
             lines.append(f"Its right log, if there is one: {to_type('tell', shown, test, 'FLIGHT.csv')}")
         answer(facts, "\n".join(lines), as_json)
@@ -104,13 +107,18 @@ def _described(run: Experiment) -> str:
     return f"{found.steps} steps, {found.ended}{f': {found.reason}' if found.reason else ''}"
 
 
-def named(test: int | None) -> str:
-    """A withdrawn flight by its test.
+def named(withdrawal: Withdrawal) -> str:
+    """What was withdrawn, in words.
 
     Args:
-        test: its number; None for an attached flight.
+        withdrawal: the entry of it.
     """
-    return "an attached flight" if test is None else f"the flight of test {test}"
+    if withdrawal.test is None:
+        return "an attached flight"
+    what = (
+        "flight" if withdrawal.failure is None else "failure" if withdrawal.run is None else "failed flight"
+    )
+    return f"the {what} of test {withdrawal.test}"
 
 
 def recorded(campaign: Campaign) -> dict[str, str]:
@@ -119,10 +127,11 @@ def recorded(campaign: Campaign) -> dict[str, str]:
     Args:
         campaign: that they were recorded in.
     """
+    runs = {run.number for run in campaign.experiments}
     tests = {
-        str(test.number): f"the {'failure' if status == 'failed' else 'flight'} of test {test.number}"
+        str(test.number): f"the {'flight' if test.number in runs else 'failure'} of test {test.number}"
         for test in campaign.tests
-        if (status := campaign.status(test)) in ("flown", "aborted", "failed")
+        if campaign.status(test) in ("flown", "aborted", "failed")
     }
     flights = {
         name: f"{name.replace('-', ' flight ')} ({run.replayed.steps} steps)"
