@@ -3,6 +3,7 @@
 import hashlib
 import itertools
 import math
+from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -18,7 +19,8 @@ from twinloop.campaign.examination.frequency import frequency_responses
 from twinloop.campaign.examination.loops import loops_around, noise_of_commands
 from twinloop.campaign.examination.poles import poles
 from twinloop.campaign.examination.steps import moved_states, step_answer
-from twinloop.campaign.examination.use import effort, envelope_use, outside_of
+from twinloop.campaign.examination.use import effort, envelope_use, gain_slopes, outside_of
+from twinloop.faces.figures.use import gains
 from twinloop.objectives import normalised_error
 
 STREAM = np.random.default_rng(11)
@@ -217,8 +219,8 @@ def test_gains_are_changed_one_at_a_time_within_their_box(good):
     for i, slope in enumerate(found.slopes):
         gain = good.family.gains[i]
         assert slope.value == best.genes[i]
-        for share, quality in zip(slope.factors, slope.qualities, strict=True):
-            assert (quality is None) == (not gain.low <= share * slope.value <= gain.high)
+        for change, quality in zip(slope.changes, slope.qualities, strict=True):
+            assert (quality is None) == (not gain.low <= slope.value + change * slope.size <= gain.high)
         genes = best.genes.copy()
         genes[i] *= 0.9
         test = good.test(genes, excitation=None)
@@ -226,3 +228,22 @@ def test_gains_are_changed_one_at_a_time_within_their_box(good):
         assert slope.qualities[1] == pytest.approx(
             good.setup.quality.flown(flown, test.target_state), rel=1e-6
         )
+
+
+def test_a_gain_of_0_is_changed_by_a_share_of_its_range(good):
+    """± 20 % of 0 is nothing: a flat line would say that the gain need not be exact."""
+    found = good.examine()
+    names = [gain.name for gain in good.family.gains]
+    place = names.index("angle.kd")
+    gain = good.family.gains[place]
+    best = good.test({**found.best.parameters, "angle.kd": 0.0}, excitation=None)
+    slope = gain_slopes(good.twin, good.setup, best)[place]
+    assert slope.of_range and slope.size == gain.high - gain.low
+    genes = best.genes.copy()
+    genes[place] = slope.changes[-1] * slope.size
+    flown = good.twin.simulate(good.test(genes, excitation=None))
+    expected = good.setup.quality.flown(flown, best.target_state)
+    assert slope.qualities[-1] == pytest.approx(expected, rel=1e-6) and expected != slope.qualities[2]
+    figure = gains(SimpleNamespace(slopes=(slope,), setup=good.setup))
+    assert figure.panels[0].x_label == "change of the gain (% of its range)"
+    assert "A gain of 0 is changed by shares of its range" in figure.caption

@@ -17,8 +17,10 @@ from twinloop.trajectory import Trajectory
 
 AT_A_BOUND = 1e-6
 """Share of a range within which a value counts as at its end."""
-SHARES = (0.8, 0.9, 1.0, 1.1, 1.2)
-"""Factors on one gain at a time."""
+CHANGES = (-0.2, -0.1, 0.0, 0.1, 0.2)
+"""Of one gain at a time, as shares of its value."""
+CHANGES_OF_NONE = (-0.05, -0.025, 0.0, 0.025, 0.05)
+"""Of a gain that is 0, as shares of its range: the usual value of a gain is a quarter of that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +71,19 @@ class GainSlope:
     Args:
         gain: its name.
         value: of the gain, in its unit.
-        factors: on the value.
-        qualities: on the twin, without noise, for each factor; infinite if the flight diverges; None beyond the
+        changes: of the gain, as shares of `size`.
+        size: the value; the range of the gain where the value is 0, of which no share is a change.
+        of_range: whether it is the range.
+        qualities: on the twin, without noise, for each change; infinite if the flight diverges; None beyond the
             gain's bounds.
         at_bound: "", "lower" or "upper": see `Family.at_bounds`.
     """
 
     gain: str
     value: float
-    factors: tuple[float, ...]
+    changes: tuple[float, ...]
+    size: float
+    of_range: bool
     qualities: tuple[float | None, ...]
     at_bound: str
 
@@ -94,16 +100,21 @@ def gain_slopes(twin: Twin, setup: Setup, best: Test) -> tuple[GainSlope, ...]:
     bounds = setup.family.at_bounds(best.genes)
     for i, gain in enumerate(setup.family.gains):
         value = float(best.genes[i])
+        span = gain.high - gain.low
+        of_range = abs(value) <= AT_A_BOUND * span
+        changes, size = (CHANGES_OF_NONE, span) if of_range else (CHANGES, value)
         qualities: list[float | None] = []
-        for share in SHARES:
-            tried = share * value
+        for change in changes:
+            tried = value + change * size
             if not gain.low <= tried <= gain.high:
                 qualities.append(None)
                 continue
             genes = best.genes.copy()
             genes[i] = tried
             qualities.append(_quality(twin, setup, replace(best.quiet(), genes=genes)))
-        found.append(GainSlope(gain.name, value, SHARES, tuple(qualities), bounds[gain.name]))
+        found.append(
+            GainSlope(gain.name, value, changes, size, of_range, tuple(qualities), bounds[gain.name])
+        )
     return tuple(found)
 
 

@@ -68,7 +68,7 @@ def coverage(found: Examination) -> Figure | None:
 
 
 def gains(found: Examination) -> Figure | None:
-    """The quality on the twin against each gain, ± 20 %."""
+    """The quality on the twin against each gain, ± 20 %, or where that is nothing ± 5 % of its range."""
     if not found.slopes:
         return None
     panels = []
@@ -79,7 +79,9 @@ def gains(found: Examination) -> Figure | None:
     room = 0.1 * max(high - low, 0.02 * high)
     for each in found.slopes:
         there = [
-            (100.0 * (f - 1.0), q) for f, q in zip(each.factors, each.qualities, strict=True) if q is not None
+            (100.0 * change, q)
+            for change, q in zip(each.changes, each.qualities, strict=True)
+            if q is not None
         ]
         held = f" (at its {each.at_bound} bound)" if each.at_bound else ""
         panels.append(
@@ -90,17 +92,19 @@ def gains(found: Examination) -> Figure | None:
                         [x for x, _ in there], [y for _, y in there], "twin", "quality on the twin", dots=True
                     )
                 ],
-                "change of the gain (%)",
+                f"change of the gain (%{' of its range' if each.of_range else ''})",
                 quality_label(found),
-                x_range=(-22.0, 22.0),
+                x_range=(110.0 * each.changes[0], 110.0 * each.changes[-1]),
                 y_range=(low - room, high + room),
             )
         )
+    none = any(each.of_range for each in found.slopes)
+    of_none = " A gain of 0 is changed by shares of its range, as ± 20 % of 0 is nothing." if none else ""
     return Figure(
         "gains",
         "Quality against each gain, ± 20 %",
         panels,
         "One gain at a time, the others held, on the twin without noise. A flat line: the gain need not be"
-        " exact. A line that ends early: the gain is at its bound.",
+        f" exact. A line that ends early: the gain is at its bound.{of_none}",
         columns=3,
     )
