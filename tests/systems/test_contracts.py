@@ -66,6 +66,22 @@ def test_a_copy_of_a_system_makes_the_runs_that_this_one_would(name, copied):
     assert system.runs == 1 and same_bits(flights(system, 2), expected[1:])
 
 
+@pytest.mark.parametrize("base", [tl.System, object])
+def test_signals_may_be_an_attribute_also_of_a_subclass(pendulum, pendulum_controller, base):
+    class Rig(base):
+        default_gains = PENDULUM_GAINS
+        controller = pendulum_controller
+
+        def __init__(self):
+            self.signals = pendulum.signals
+
+        def run(self, test):
+            return pendulum.run(test)
+
+    assert isinstance(Rig(), tl.System)
+    check_system(Rig(), target_state=np.array([1.0, 0.0]))
+
+
 class Broken(tl.System):
     """A pendulum with one promise broken."""
 
