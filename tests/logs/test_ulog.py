@@ -186,6 +186,24 @@ def test_a_log_that_was_cut_is_read_until_then_and_it_is_said(tmp_path):
     assert [each["severity"] for each in found["remarks"] if each["code"] == "cut"] == ["note"]
 
 
+@pytest.mark.parametrize("trash", [bytes(range(256)) * 8, b"\xff" * 300, b"D" * 2000, b"\xf0\xf0Dxyz" * 50])
+def test_a_log_that_is_damaged_within_is_not_taken_for_one_that_was_cut(tmp_path, trash):
+    whole = ulog(FORMATS, rows())
+    at = round(0.4 * len(whole))
+    assert len(whole) - at > 10_000 + len(trash)
+    said = refused(written(tmp_path, whole[:at] + trash + whole[at + len(trash) :]))
+    assert "expected a whole log, found a damaged one" in said
+
+
+def test_a_log_that_was_cut_at_any_byte_of_a_message_was_cut(tmp_path):
+    whole = ulog(FORMATS, rows())
+    for lost in range(1, 40):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            assert tl.load(written(tmp_path, whole[:-lost]), SIGNALS, columns=COLUMNS).steps > 90
+        assert all("ends within a message" in str(each.message) for each in said)
+
+
 @pytest.mark.parametrize(("unit", "turn"), [("rad", 2.0 * np.pi), ("deg", 360.0)])
 def test_a_heading_that_wraps_between_two_samples_goes_on(tmp_path, unit, turn):
     def heading(t):

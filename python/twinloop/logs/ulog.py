@@ -25,6 +25,12 @@ EULER = ("roll", "pitch", "yaw")
 """Angles that stand in no field and are made of a topic's quaternion q, which turns by yaw, then pitch, then roll."""
 APART = 2.0
 """Periods by which two samples of a field may be apart: between them nobody knows what was."""
+HEADER = 3
+"""Bytes before each message: its size (2), and its kind."""
+KINDS = frozenset(bytes([kind]) for kind in b"ABCDFILMOPQRS")
+"""Of messages, by the specification of the format."""
+LONGEST = 10_000
+"""Bytes of a message; one that is longer is taken for damage, as by pyulog."""
 MOST_FIELDS = 20_000
 """Of a topic, arrays and nested ones unfolded: a few bytes of a file could ask for billions."""
 
@@ -43,14 +49,24 @@ class Window:
 
 
 class _Watched(io.BufferedReader):
-    """A file that knows whether it ended within what was to be read, as it does where power was lost."""
+    """A file that knows whether it ended within a message, and whether that had a header that makes sense.
 
-    cut = False
+    Where power was lost the last message was begun as all others. Damage within a file leads to a header of any bytes,
+    whose message seems to go beyond the end.
+    """
+
+    cut = damaged = False
+    _before = b""
 
     def read(self, size: int | None = -1, /) -> bytes:
         data = super().read(size)
         # At its right end a file has no byte of another message.
-        self.cut |= size is not None and 0 < len(data) < size
+        if size is not None and 0 < len(data) < size:
+            self.cut = True
+            header = self._before
+            if len(header) == HEADER and int.from_bytes(header[:2], "little") == size:
+                self.damaged = header[2:] not in KINDS or len(data) > LONGEST
+        self._before = data
         return data
 
 
@@ -169,7 +185,7 @@ def _parsed(path: Path, called: str, topics: list[str]) -> tuple[Any, bool]:
         raise InvalidInput(
             f"Log {called}: expected a log of PX4 (ULog), found another file or a damaged one: {reason}."
         ) from reason
-    if log.file_corruption:
+    if log.file_corruption or file.damaged:
         raise InvalidInput(
             f"Log {called}: expected a whole log, found a damaged one; copy it from the card again, or save"
             " its undamaged part as CSV."
