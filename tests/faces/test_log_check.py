@@ -96,6 +96,12 @@ def test_a_log_of_a_head_alone_is_too_short(checked):
     assert said.exit_code == 1 and "The log has 0 rows" in said.stdout and said.stdout.count("✗") == 2
 
 
+def test_of_a_single_row_it_is_said_that_it_is_short_and_nothing_else(checked):
+    said = checked(without(range(1, 121)))
+    assert said.exit_code == 1 and said.stdout.count("✗") == 2
+    assert "1 row over 0 s" in said.stdout and "The log has 1 row: at least 3 are needed" in said.stdout
+
+
 NOTES = {
     "constant-command": (changed("torque", 1.0), "torque is 1 N m in every row"),
     "saturated": (changed("torque", lambda u: np.sign(u) * 2.0), "at a bound in 100 %"),

@@ -12,6 +12,7 @@ from twinloop.campaign.remaining import Estimate, duration
 from twinloop.faces.result import plain, to_json
 from twinloop.faces.text import quality_words, render, table
 from twinloop.faces.text.twin import hidden_states
+from twinloop.faces.text.verdict import _verdict_on_twin
 
 
 @pytest.mark.parametrize(
@@ -194,3 +195,13 @@ def test_a_mass_behind_a_gap_is_said_once_with_its_play():
     (said,) = hidden_states([one, one])
     assert "behind a gap: rate drives it, with a play of ±0.06 (unit of rate, times s)" in said
     assert "swing once in 0.157 s; its own rate decays to 1/e in 0.7 s" in said
+
+
+@pytest.mark.parametrize(
+    ("count", "more"),
+    [(1, ""), (2, " There is 1 more serious remark."), (3, " There are 2 more serious remarks.")],
+)
+def test_a_verdict_counts_the_serious_remarks_that_it_does_not_say(count, more):
+    remarks = [{"severity": "serious", "sentence": "Commands moved and nothing answered."}] * count
+    said = _verdict_on_twin({"twin": {"remarks": remarks}})
+    assert said == f"not reliable yet. Commands moved and nothing answered.{more}"

@@ -83,7 +83,7 @@ def _clock(found: LogCheck) -> str:
 
 
 def _text(log: Path, found: LogCheck) -> str:
-    lines = [f"{log}: {found.rows} rows{_clock(found)}."]
+    lines = [f"{log}: {found.rows} row{'s' * (found.rows != 1)}{_clock(found)}."]
     rows = [
         [
             column.name,

@@ -253,6 +253,16 @@ def test_readings_of_nothing_but_noise_are_a_serious_remark():
     )
 
 
+@pytest.mark.parametrize("spike", [1e3, 1e6, -1e6])
+def test_a_single_wrong_reading_makes_no_noise_of_a_log(spike):
+    def wrong(x):
+        x = x.copy()
+        x[STEPS // 2] = spike
+        return x
+
+    assert "only-noise" not in codes(flown(change=wrong))
+
+
 def test_what_no_controller_corrects_is_held_against_no_effect_alone():
     (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, STEPS, Findings(False, without_test=True))
     assert remark.code == "does-not-follow" and remark.serious

@@ -23,6 +23,8 @@ COUNTS = 1.5
 """Counts of a rounded sensor that it moved last before it froze: by one of them it also comes to rest by itself."""
 WHITE = 1.5
 """Von Neumann's ratio, 2 for white noise and near 0 for what moves smoothly, above which nothing else is seen."""
+SPIKES = 0.01
+"""Share of the readings, and one more, that may be wrong at each end."""
 SOME = 20
 """Readings of a run at least that tell noise from motion."""
 
@@ -72,7 +74,7 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
             )
     moved = [i for i in range(signals.n_x) if any(np.ptp(run.states[:, i]) > 0.0 for run in runs)]
     enough = any(len(run.states) >= SOME for run in runs)
-    if moved and enough and all(ratio([run.states[:, i] for run in runs]) > WHITE for i in moved):
+    if moved and enough and all(ratio([_clipped(run.states[:, i]) for run in runs]) > WHITE for i in moved):
         yield serious(
             "only-noise",
             "Readings change from row to row as much as over whole runs: they contain only noise; check"
@@ -110,6 +112,13 @@ def froze(readings: Floats) -> bool:
     beside = [steps[k] for k in (first - 1, last - 1) if 0 <= k < len(steps)]
     at_once = max(AT_ONCE * usual, COUNTS * float(np.diff(np.unique(readings)).min()))
     return bool(usual > 0.0 and beside and min(beside) > at_once)
+
+
+def _clipped(readings: Floats) -> Floats:
+    """Readings (n + 1,) without the few that are furthest out: a single wrong one would look like noise alone."""
+    ordered = np.sort(readings)
+    few = 1 + int(SPIKES * len(readings))
+    return np.clip(readings, ordered[few], ordered[-1 - few]) if len(readings) > 2 * few else readings
 
 
 def ratio(records: Sequence[Floats]) -> float:

@@ -191,7 +191,9 @@ def against(
 
 def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) -> Iterator[Remark]:
     if len(t) < 3:
-        yield serious("short", f"The log has {len(t)} rows: at least 3 are needed to learn from.")
+        yield serious(
+            "short", f"The log has {len(t)} row{'s' * (len(t) != 1)}: at least 3 are needed to learn from."
+        )
         return
     if len(steps) < len(t) - 1:
         yield serious("times", "Some rows have no time: remove them.")
@@ -307,6 +309,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
         return
     if column.least is None:
         return  # a log without rows: that it is too short is said already
+    if rows == 1:
+        return  # of a single reading nothing can be said
     if column.least == column.greatest:
         yield serious(
             "still",

@@ -29,7 +29,9 @@ def _verdict_on_twin(result: Mapping[str, Any]) -> str:
         if isinstance(remark, dict) and remark["severity"] == "serious"
     ]
     if grave:
-        more = f" There are {len(grave) - 1} more serious remarks." if len(grave) > 1 else ""
+        others = len(grave) - 1
+        more = f" There {'is' if others == 1 else 'are'} {others} more serious remark{'s' * (others > 1)}."
+        more = more if others else ""
         return f"not reliable yet. {grave[0]}{more}"
     worst = max(
         (run["normalised"] for run in result["experiments"] if run["normalised"] is not None), default=None
