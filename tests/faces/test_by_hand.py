@@ -3,6 +3,7 @@
 import csv
 import json
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -215,6 +216,17 @@ def test_a_batch_is_flown_in_any_order_and_what_is_abandoned_counts_nothing(fold
     assert [test.number for test in campaign.waiting] == [asked[1]["test"]]
     assert len(campaign.experiments) == 2 and [r.number for r in campaign.experiments] == [0, best]
     assert run("ask", "rig.db", "--batch", "2", "--last").exit_code == 2
+
+
+def test_a_sheet_says_that_another_test_waits_with_its_gains(folder):
+    run("ask", "rig.db")
+    campaign = look()
+    test = campaign.tests[0]
+    near = replace(test, number=7, genes=test.genes * (1.0 + 1e-12))
+    other = replace(test, number=8, genes=test.genes * 1.001)
+    said = sheet("rig.db", test, None, "rig-test-0.csv", campaign.setup, waiting=(test, near, other))
+    assert "Test 7, which waits too, has these gains with another excitation." in said
+    assert said.count("waits too") == 1
 
 
 def test_what_is_learnt_from_a_batch_is_the_same_with_and_without_the_abandoned(folder):

@@ -101,7 +101,9 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
-    text = sheet(shown_name(store), test, predicted, str(file), campaign.setup, against_twin)
+    text = sheet(
+        shown_name(store), test, predicted, str(file), campaign.setup, against_twin, campaign.waiting
+    )
     return text, facts(test, file, bool(campaign.experiments), predicted, against_twin)
 
 

@@ -182,6 +182,20 @@ def _held_back(test: Test, file: str) -> list[str]:
     ]
 
 
+def _alike(test: Test, waiting: Sequence[Test]) -> list[str]:
+    """The tests that wait with the gains of this one, as far as a sheet shows them."""
+    return [
+        f"Test {other.number}, which waits too, has these gains with another excitation."
+        for other in waiting
+        if other.number != test.number and _set(other) == _set(test)
+    ]
+
+
+def _set(test: Test) -> dict[str, str]:
+    """Gains as somebody sets them."""
+    return {name: f"{value:.9g}" for name, value in test.parameters.items()}
+
+
 def _range(ends: list[float | None]) -> str:
     low, high = ("any" if end is None else f"{end:.4g}" for end in ends)
     return f"{low} to {high}"
@@ -194,6 +208,7 @@ def sheet(
     file: str,
     setup: Setup,
     against: Sequence[Remark] = (),
+    waiting: Sequence[Test] = (),
 ) -> str:
     """The test sheet, to be printed.
 
@@ -204,9 +219,10 @@ def sheet(
         file: where its columns are.
         setup: of the campaign.
         against: what speaks against the twin.
+        waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
-    gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
+    gains = [[name, value, units[name]] for name, value in _set(test).items()]
     ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
     states = [[state.name, start, target, state.unit] for state, start, target in ends]
     added = "none" if test.excitation is None else f"a row a period in {file}, added before the bounds"
@@ -237,7 +253,7 @@ def sheet(
     lines.append(f"Risk of {risk_of_what(bounded)}: {risk}")
     lines += band_leaves(signals, predicted)
     lines += not_reliable(store, against)
-    lines.append(reason(test, predicted is not None))
+    lines += [reason(test, predicted is not None), *_alike(test, waiting)]
     lines += [f"{one}." for one in in_words(signals)]
     read = [signals.state_names[i] for i in signals.measured]
     lines.append(f"Record t, {', '.join((*read, *signals.command_names))}, then:")

@@ -247,7 +247,8 @@ class Pages:
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test) if campaign.history else None
         against = serious_of(latest_lesson(campaign))
-        return sheet(self.desk.title, test, predicted, f"test-{number}.csv", campaign.setup, against)
+        waiting, file = to_be_flown(campaign), f"test-{number}.csv"
+        return sheet(self.desk.title, test, predicted, file, campaign.setup, against, waiting)
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
