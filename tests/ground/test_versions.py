@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from twinloop._ground import versions
-from twinloop.campaign.keeping import as_typed
+from twinloop.campaign.keeping import as_typed, without_tokens
 from twinloop.faces.report.source import source
 
 
@@ -25,6 +25,14 @@ from twinloop.faces.report.source import source
 )
 def test_a_command_is_what_a_person_would_type(words, typed):
     assert as_typed(words) == typed == as_typed(typed)
+
+
+@pytest.mark.parametrize("token", [["--token", "opensesame"], ["--token=opensesame"]])
+def test_a_command_that_is_recorded_has_no_token(token):
+    words = ["twinloop", "dashboard", "rig.db", *token, "--port", "0"]
+    shown = without_tokens(words)
+    assert "opensesame" not in " ".join(shown) and shown[:3] == words[:3] and shown[-2:] == words[-2:]
+    assert without_tokens(shown) == shown and without_tokens(words[:3]) == words[:3]
 
 
 def test_the_commit_is_that_of_the_checkout_the_package_stands_in():

@@ -241,8 +241,21 @@ def provenance(threads: int) -> Record:
 
 
 def command_line() -> list[str]:
-    """The command of this process as a person would type it, without passwords."""
-    return [whole_characters(shown_name(word)) for word in as_typed(sys.argv)]
+    """The command of this process as a person would type it, without passwords and tokens."""
+    return [whole_characters(shown_name(word)) for word in without_tokens(as_typed(sys.argv))]
+
+
+def without_tokens(words: Sequence[str]) -> list[str]:
+    """A command of which nobody reads what opens its dashboard.
+
+    Args:
+        words: of it.
+    """
+    before = ["", *words]
+    return [
+        "***" if last == "--token" else "--token=***" if word.startswith("--token=") else word
+        for last, word in zip(before, words, strict=False)
+    ]
 
 
 def as_typed(words: Sequence[str]) -> list[str]:

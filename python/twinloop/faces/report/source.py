@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.keeping import as_typed, look
+from twinloop.campaign.keeping import as_typed, look, without_tokens
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
 from twinloop.records.reading import from_text
@@ -110,7 +110,9 @@ def _session(found: Mapping[str, Any]) -> dict[str, str]:
     versions = found.get("versions")
     return {
         "begun": str(found.get("started", ""))[:16].replace("T", " "),
-        "command": shlex.join(as_typed([shown_name(str(word)) for word in found.get("command") or ()])),
+        "command": shlex.join(
+            as_typed(without_tokens([shown_name(str(word)) for word in found.get("command") or ()]))
+        ),
         "versions": ", ".join(f"{k} {v}" for k, v in versions.items())
         if isinstance(versions, Mapping)
         else "",
