@@ -35,14 +35,16 @@ def flown(asked, how=Excited.HELD_BACK, noise=0.0):
     """The flight of a test by a program that treats its excitation in some way."""
     plant = tl.systems.Simulated(SIGNALS, pendulum_step, noise=noise, seed=1)
     run = plant.run(as_excited(asked, how))
-    return SimpleNamespace(test=asked, replayed=asked, number=asked.number, trajectory=run)
+    return SimpleNamespace(test=asked, replayed=asked, number=asked.number, trajectory=run, off_start=())
 
 
 def sent(flight, change):
     """The same flight with other commands on record."""
     run = flight.trajectory
     other = tl.Trajectory(run.t, run.states, change(run.commands))
-    return SimpleNamespace(test=flight.test, replayed=flight.test, number=flight.number, trajectory=other)
+    return SimpleNamespace(
+        test=flight.test, replayed=flight.test, number=flight.number, trajectory=other, off_start=()
+    )
 
 
 def codes(flight):
@@ -109,7 +111,7 @@ def test_a_program_that_adds_the_excitation_to_commands_that_have_it_is_seen(tes
         commands.append(np.clip(twice, *TORQUE))
         states.append(pendulum_step(states[-1], commands[-1]))
     run = tl.Trajectory(SIGNALS.dt * np.arange(asked.steps + 1), np.array(states), np.array(commands))
-    flight = SimpleNamespace(test=asked, replayed=asked, number=asked.number, trajectory=run)
+    flight = SimpleNamespace(test=asked, replayed=asked, number=asked.number, trajectory=run, off_start=())
     assert seen(flight) is Excited.TWICE and other_commands([flight]) == []
 
 
@@ -119,7 +121,7 @@ def saturated(asked):
     states = np.column_stack([asked.target_state[0] - 8.0 + 0.01 * rows, np.full(len(rows), 0.2)])
     run = tl.Trajectory(SIGNALS.dt * rows, states, np.full((asked.steps, 1), TORQUE[1]))
     own = dataclasses.replace(asked, initial_state=states[0], hold_back=None, predicted=1.0)
-    return SimpleNamespace(test=own, replayed=own, number=own.number, trajectory=run)
+    return SimpleNamespace(test=own, replayed=own, number=own.number, trajectory=run, off_start=())
 
 
 def test_what_bounds_hide_was_not_left_out(test):
@@ -146,7 +148,12 @@ def test_a_flight_whose_excitation_is_hidden_counts_as_it_was_asked_for(tmp_path
 def test_a_test_without_an_excitation_has_none_that_could_be_left_out(test):
     flight = flown(test.quiet())
     assert seen(flight) is Excited.HELD_BACK and codes(flight) == []
-    assert codes(SimpleNamespace(test=None, replayed=None, number=None, trajectory=flight.trajectory)) == []
+    assert (
+        codes(
+            SimpleNamespace(test=None, replayed=None, number=None, trajectory=flight.trajectory, off_start=())
+        )
+        == []
+    )
 
 
 def test_tests_that_are_held_back_nowhere_are_flown_whole_and_as_they_say(test):

@@ -14,6 +14,7 @@ from lives import new as new_of
 from twinloop.campaign.assessment import advice as assessed
 from twinloop.errors import RemarkWarning
 from twinloop.faces.result import summary, to_json
+from twinloop.law.beginning import start_of
 from twinloop.remarks import Remark, note, serious
 
 GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
@@ -30,7 +31,7 @@ def test_the_fit_is_that_of_the_free_run_under_the_recorded_commands():
     twin, record = begun().run(PLANT, 2).twin, by_hand(40)
     table = twin.fit(record)
     y = record.states[1:]
-    start = twin.model.states_of(record.states[:1])[0]
+    start = start_of(twin.model, record.states, record.commands, twin.limits)
     simulated = twin.simulate_commands(start, record.commands).states[1:]
     for i, row in enumerate(table):
         off, around = y[:, i] - simulated[:, i], y[:, i] - y[:, i].mean()

@@ -96,6 +96,15 @@ def test_it_begins_nearer_to_the_truth_than_the_first_reading():
     assert (nearer[0] < 0.7 * nearer[1]).all()
 
 
+def test_it_begins_no_further_from_the_first_reading_than_noise_explains():
+    """Readings of another system, which the model would follow better from elsewhere."""
+    _, read, commands = read_of_all(0.01)
+    bent = read + np.array([0.3, 0.0]) * np.linspace(0.0, 1.0, len(read))[:, None] ** 0.3
+    noise = np.sqrt(np.median(np.diff(bent, n=3, axis=0) ** 2, axis=0) / (0.4549 * 20.0))
+    off = np.abs(start_of(PLAIN, bent, commands, LIMITS) - bent[0])
+    assert (off <= 3.0 * noise * (1.0 + 1e-9)).all() and (off >= 2.9 * noise).any()
+
+
 def test_where_the_model_diverges_from_its_readings_it_begins_as_it_was_read():
     far = np.full((30, 2), 1e3)
     assert same_bits(start_of(PLAIN, far, np.zeros((29, 1)), LIMITS), far[0])

@@ -29,6 +29,8 @@ BESIDE = 1e-3
 """Share of its scale by which a rate is varied for the slopes of the readings."""
 EXACT = 1e-6
 """Least noise of a sensor, as a share of its state's scale, by which its readings count."""
+SURE = 3.0
+"""Standard deviations of its noise by which a first reading may be off."""
 TINY = 1e-300
 """So that what does not show is not divided by nothing."""
 
@@ -110,6 +112,8 @@ def _smoothed(
 ) -> Floats:
     """The state (n_x,) with which a model follows first readings best, with what was read of it among them.
 
+    It is no further from what was read than noise explains: what a model is wrong about must not move it.
+
     Args:
         model: that follows.
         read: the state as it was read (n_x,).
@@ -140,7 +144,8 @@ def _smoothed(
         if after is None or not float((after * after).sum()) < float((left * left).sum()):
             break
         best, left = tried, after
-    return best
+    found: Floats = np.clip(best, read - SURE * noise, read + SURE * noise)
+    return found
 
 
 def _noise(readings: Floats, scales: Floats) -> Floats:

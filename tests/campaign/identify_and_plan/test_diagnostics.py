@@ -37,7 +37,7 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False, commands
     trajectory = tl.Trajectory(
         t, change(states), 0.1 * np.sin(5.0 * t[:-1, None]) if commands is None else commands
     )
-    return SimpleNamespace(trajectory=trajectory, complete=not cut, test=None)
+    return SimpleNamespace(trajectory=trajectory, complete=not cut, test=None, off_start=())
 
 
 def said(*runs, follows=True):
@@ -186,7 +186,7 @@ def test_two_commands_exchanged_among_four_are_found_and_named():
     def recorded(columns):
         commands = run.commands[:, columns]
         flight = tl.Trajectory(run.t, run.states, commands)
-        return SimpleNamespace(test=test, replayed=test, number=0, trajectory=flight)
+        return SimpleNamespace(test=test, replayed=test, number=0, trajectory=flight, off_start=())
 
     assert other_commands([recorded([0, 1, 2, 3])]) == []
     for columns in ([1, 0, 2, 3], [2, 1, 0, 3], [0, 3, 2, 1]):
