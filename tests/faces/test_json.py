@@ -41,7 +41,7 @@ def room(tmp_path_factory):
         (("certify", "rig.db", "-o", "sheet"), {"granted", "refusals", "files"}),
         (("settings", "rig.db", "1", "-o", "sheet"), {"files", "note"}),
         (("export", "rig.db", "twin", "--to", "latex", "--force"), {"kind", "text"}),
-        (("export", "rig.db", "controller", "-o", "law.py"), {"kind", "files"}),
+        (("export", "rig.db", "controller", "-o", "law.py", "--force"), {"kind", "files"}),
         (("check", "flight1.csv", "signals.toml"), {"fit", "rows", "remarks"}),
         (("tell", "rig.db", "1", "flight1.csv"), {"test", "status", "quality", "experiments"}),
         (("learn", "rig.db"), {"learnt"}),

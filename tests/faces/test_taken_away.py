@@ -130,7 +130,22 @@ def test_the_twin_in_every_kind_compared_with_its_flights(flown, kind, tmp_path)
 @pytest.mark.parametrize("kind", ["python", "c"])
 def test_the_controller_compared_on_its_flights(flown, kind, tmp_path):
     campaign, _ = flown
-    assert campaign.export_controller(tmp_path / f"loop{SUFFIXES[kind]}")
+    assert campaign.export_controller(tmp_path / f"loop{SUFFIXES[kind]}", campaign.best_test.parameters)
+
+
+def test_gains_that_have_not_flown_leave_only_certified_by_name_or_by_force(flown, tmp_path):
+    campaign, _ = flown
+    best, file = campaign.best_test, tmp_path / "loop.py"
+    flew = any(
+        run.test is not None and run.test.parameters == best.parameters for run in campaign.experiments
+    )
+    if flew or campaign.certificate().granted:
+        assert campaign.export_controller(file)
+        return
+    with pytest.raises(tl.NotTrusted, match="would be certified"):
+        campaign.export_controller(file)
+    assert not file.exists()
+    assert campaign.export_controller(file, best.parameters) and campaign.export_controller(file, force=True)
 
 
 def test_no_controller_is_written_in_a_kind_that_only_a_twin_has(flown, tmp_path):

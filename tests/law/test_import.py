@@ -15,6 +15,7 @@ import twinloop as tl
 from law_twins import SIGNALS, TWINS, stored_twin
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.remarks import note
 
 FOLDER = Path(__file__).parent / "twins"
 SAVED = sorted(FOLDER.glob("*.json"))
@@ -48,7 +49,7 @@ def write(folder=FOLDER):
         )
         twin = tl.Twin(
             bare.model, bare.signals, [TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)], members=[bare.model],
-            noise=noise, seed=3, inflation=1.5, flights=[run],
+            noise=noise, seed=3, inflation=1.5, flights=[run], remarks=[note("form", "The form was searched.")],
         )  # fmt: skip
         rows = {"commands": run.commands, "states": run.true_states, "readings": run.states}
         saved = {
@@ -94,6 +95,7 @@ def test_all_of_it_comes_back(path, tmp_path):
     again = twin.export("json")
     if path.stem.startswith(f"version-{tl.Twin.VERSION}-"):
         assert again == saved["twin"]  # nothing was lost on the way
+        assert [remark.code for remark in twin.remarks] == ["form"]
     (tmp_path / "again.json").write_text(again, encoding="utf-8")
     assert tl.load_twin(tmp_path / "again.json").export("json") == again
 

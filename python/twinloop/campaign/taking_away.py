@@ -43,8 +43,6 @@ def taken_controller(
 ) -> str | tuple[Path, ...]:
     """A controller as `Campaign.export_controller` describes it, compared on the flights of the campaign."""
     kind, path = asked(to, kind)
-    if parameters is None and not force:
-        _refuse_unproven(campaign)
     genes = campaign.best_test.genes if parameters is None else campaign.family.genes(parameters)
     name = "controller" if path is None else path.stem
     flights = [] if force else [run.trajectory for run in campaign.experiments]
@@ -52,6 +50,8 @@ def taken_controller(
     texts = exported_controller(
         setup.controller, setup.family, genes, kind, name, precision, flights, setup.target_state
     )
+    if parameters is None and not force:
+        _refuse_unproven(campaign)
     return delivered(texts, name, path)
 
 
