@@ -20,7 +20,7 @@ from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
-from twinloop.faces.telling import against_it, counted, numbered, tell_failed
+from twinloop.faces.telling import against_it, counted, numbered, tell_failed, to_be_flown
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
@@ -64,8 +64,7 @@ def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | N
         waiting = campaign.waiting
         # Whatever was attached: the first test is the controller that is trusted.
         if all(run.attached for run in campaign.experiments):
-            made = (test for test in campaign.tests if campaign.status(test) == "asked")
-            test = next(made, None) or _first(store, campaign)
+            test = next(iter(to_be_flown(campaign)), None) or _first(store, campaign)
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
         text, described = _shown(store, campaign, test)

@@ -63,7 +63,7 @@ def export(
             against = [] if force else [remark.sentence for remark in twin.remarks if remark.serious]
             if against:
                 raise NotTrusted(
-                    f"Export: expected a twin of which nothing serious is said, found: {' '.join(against)} Learn from"
+                    f"Export: expected a twin without serious remarks, found: {' '.join(against)} Learn from"
                     " more logs, or pass --force."
                 )
             made = twin.export(to, kind=of_file, precision=precision, force=force)

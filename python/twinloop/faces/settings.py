@@ -15,7 +15,7 @@ from twinloop.campaign.assessment import foreseen
 from twinloop.errors import NotAvailable
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
-from twinloop.faces.telling import numbered
+from twinloop.faces.telling import numbered, to_be_flown
 from twinloop.logs import TIME, write_columns
 from twinloop.test import Test
 
@@ -44,13 +44,13 @@ def settings(
     campaign, declared, autopilot = given.campaign, given.declared, given.autopilot
     asked = numbered(campaign, test)
     texts: dict[str, str] = {}
-    said = ""
+    said: list[str] = []
     if autopilot is not None and declared is not None:
         old, restore = _to_go_back_to(campaign), f"restore{autopilot.suffix}"
         if old is None:
             # One of an earlier time would hold gains that have failed since.
             (output / restore).unlink(missing_ok=True)
-            said = "No restore file: no test is known to fly; keep the gains that the vehicle has now."
+            said.append("No restore file: no test is known to fly; keep the gains that the vehicle has now.")
         else:
             whose = f"The gains of test {old.number}: load to go back."
             texts[restore] = autopilot.text(old.parameters, whose)
@@ -61,15 +61,15 @@ def settings(
             try:
                 texts[f"test-{test}-sweep{autopilot.suffix}"] = declared.sweep.settings(autopilot.kind, asked)
             except NotAvailable as reason:
-                said = f"{said} {reason}"
+                said.append(str(reason))
         elif asked.excitation is not None:
-            said += (
-                f" Chirp settings: expected [autopilot.sweep] and one of {', '.join(AXES)}, which sweep one axis by"
+            said.append(
+                f"Chirp settings: expected [autopilot.sweep] and one of {', '.join(AXES)}, which sweep one axis by"
                 " themselves; send the table of commands."
             )
     if asked.excitation is not None and asked.hold_back is not None:
-        said += (
-            " The excitation is to be held back as the test sheet says; the table has the rows to be scaled."
+        said.append(
+            "The excitation is to be held back as the test sheet says; the table has the rows to be scaled."
         )
     columns = _columns(campaign, asked)
     output.mkdir(parents=True, exist_ok=True)
@@ -78,17 +78,14 @@ def settings(
     table = output / f"test-{test}-commands.csv"
     write_columns(table, columns)
     written = [str(output / file) for file in [*texts, table.name]]
-    text = f"Wrote {', '.join(written)}." + (f" {said.strip()}" if said else "")
-    answer({"files": written, "note": said.strip()}, text, as_json)
+    notes = " ".join(said)
+    text = f"Wrote {', '.join(written)}. {notes}".rstrip()
+    answer({"files": written, "note": notes}, text, as_json)
 
 
 def _to_go_back_to(campaign: Campaign) -> Test | None:
     """The first test that is known to fly; before any was told of, the first one that waits."""
-    told = campaign.failures or any(run.test is not None for run in campaign.experiments)
-    waits = (
-        None if told else next((test for test in campaign.tests if campaign.status(test) == "asked"), None)
-    )
-    return campaign.trusted or waits
+    return campaign.trusted if campaign.runs else next(iter(to_be_flown(campaign)), None)
 
 
 def _columns(campaign: Campaign, test: Test) -> dict[str, Floats]:

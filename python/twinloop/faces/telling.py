@@ -164,6 +164,15 @@ def tell_failed(
     return test, found
 
 
+def to_be_flown(campaign: Campaign) -> list[Test]:
+    """Tests without a run that nobody has given up: asked for, made by hand, or with a run that was withdrawn.
+
+    Args:
+        campaign: of them.
+    """
+    return [test for test in campaign.tests if campaign.status(test) == "asked"]
+
+
 def against_it(campaign: Campaign, flight: Experiment, test: Test | None, read: Log) -> list[str]:
     """What speaks against a flight that was told or attached: said at once, while somebody can still look at the rig.
 

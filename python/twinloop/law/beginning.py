@@ -24,7 +24,7 @@ from twinloop.signals import Signals
 FIRST = 12
 """Readings after the first by which the rate at the start is found."""
 TURNS = 4
-"""Steps for each rate."""
+"""Steps of Gauss and Newton, for each computed rate or for all states at once."""
 BESIDE = 1e-3
 """Share of its scale by which a rate is varied for the slopes of the readings."""
 EXACT = 1e-6
@@ -140,7 +140,10 @@ def _smoothed(
             break
         slopes = np.stack([each - left for each in beside if each is not None], axis=1)
         step = solve_linear(product(slopes.T, slopes), product(slopes.T, left[:, np.newaxis]))
-        after = None if step is None else missed(tried := best - noise * step[:, 0])
+        if step is None:
+            break
+        tried = best - noise * step[:, 0]
+        after = missed(tried)
         if after is None or not float((after * after).sum()) < float((left * left).sum()):
             break
         best, left = tried, after

@@ -125,8 +125,9 @@ class Judged:
     @property
     def mean_of_finite(self) -> Floats:
         """Mean quality of the flights that do not diverge (K,); 0 where none is left."""
-        finite = np.isfinite(self.qualities).sum(axis=(0, 1))
-        mean: Floats = self.finite.qualities.sum(axis=(0, 1)) / np.maximum(1, finite)
+        lasts = np.isfinite(self.qualities)
+        total = np.where(lasts, self.qualities, 0.0).sum(axis=(0, 1))
+        mean: Floats = total / np.maximum(1, lasts.sum(axis=(0, 1)))
         return mean
 
     @property

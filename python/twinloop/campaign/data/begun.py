@@ -59,9 +59,9 @@ def from_other_starts(
         )
         yield say(
             "other-start",
-            f"The flight of test {run.test.number} began elsewhere than its test: {places}. It is learnt; what was"
-            " predicted was not of it, and its quality compares with no other. Begin where the sheet says, or declare"
-            " where flights begin.",
+            f"The flight of test {run.test.number} began elsewhere than its test: {places}. It is learnt. But"
+            " the prediction was for another start, and its quality is not compared with that of other flights. Begin"
+            " where the sheet says, or declare where flights begin.",
         )
 
 

@@ -77,7 +77,7 @@ def from_another_excitation(test: Test, run: Trajectory) -> Iterator[Remark]:
         test: as it was asked for.
         run: that was recorded of it.
     """
-    how, it = excited(test, run), f"The excitation of test {test.number}"
+    how, subject = excited(test, run), f"The excitation of test {test.number}"
     if how is Excited.NOT and hidden(test, run):
         yield note(
             "excitation",
@@ -87,20 +87,20 @@ def from_another_excitation(test: Test, run: Trajectory) -> Iterator[Remark]:
     elif how is Excited.NOT:
         yield note(
             "excitation",
-            f"{it} was not added to the commands: this flight tells less. The test sheet says"
+            f"{subject} was not added to the commands: this flight tells less. The test sheet says"
             " where it is and how to add it.",
         )
     elif how is Excited.WHOLE:
         yield serious(
             "excitation",
-            f"{it} was flown without holding it back: such a flight may lead further than its"
+            f"{subject} was flown without holding it back: such a flight may lead further than its"
             " sheet says. Scale it by the readings, as the sheet tells; for a program that cannot do this, set"
             " hold_back = false under [options] and begin a new campaign: then the excitation stays small.",
         )
     elif how is Excited.TWICE:
         yield serious(
             "excitation",
-            f"{it} was flown twice as strong: such a flight may lead further than its sheet"
+            f"{subject} was flown twice as strong: such a flight may lead further than its sheet"
             " says. The commands of test.controller() have it already: send them as they are.",
         )
 

@@ -22,12 +22,12 @@ from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
 from twinloop.faces.cautions import serious_of
-from twinloop.faces.dashboard.desk import Desk, to_be_flown, unlearnt
+from twinloop.faces.dashboard.desk import Desk, unlearnt
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
-from twinloop.faces.telling import numbered
+from twinloop.faces.telling import numbered, to_be_flown
 from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
 from twinloop.planning.leaving import risk_of_what, risk_words

@@ -11,7 +11,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
-from twinloop.faces.telling import against_it, attach, counted, numbered, tell, tell_failed
+from twinloop.faces.telling import against_it, attach, counted, numbered, tell, tell_failed, to_be_flown
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
 from twinloop.logs import Log
 from twinloop.store import Doing, approve, approved, doing, is_address, listed, opened, shown_name, state
@@ -253,15 +253,6 @@ class Desk:
 
     def _campaign(self, name: str) -> closing[Campaign]:
         return closing(Campaign.load(self.store, name, threads=self.threads, progress=None))
-
-
-def to_be_flown(campaign: Campaign) -> list[Test]:
-    """Tests without a run that nobody has given up: asked for, made by hand, or with a run that was withdrawn.
-
-    Args:
-        campaign: of them.
-    """
-    return [test for test in campaign.tests if campaign.status(test) == "asked"]
 
 
 def unlearnt(campaign: Campaign) -> str:
