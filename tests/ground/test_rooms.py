@@ -17,7 +17,9 @@ FRONTS = {
     "_experiment": "envelope hold_back limits replay",
     "_ground": "arrays elementary loading rounding showing slopes steps streams texts times values versions writing",
     "autopilots": "declared files sweep",
-    "campaign": "assessment campaign_file certificate cost excited from_logs history keeping presets remaining setup",
+    "campaign": (
+        "assessment campaign_file certificate cost excited from_logs history keeping presets provenance remaining setup"
+    ),
     "campaign/coevolution": "method search",
     "campaign/data": "begun declared gains lateness levels readings reports sent wrapped",
     "campaign/examination": (

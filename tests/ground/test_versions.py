@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from twinloop._ground import versions
-from twinloop.campaign.keeping import as_typed, without_tokens
+from twinloop.campaign.provenance import as_typed, without_tokens
 from twinloop.faces.report.source import source
 
 

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import platform
-import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
-from twinloop import _core
-from twinloop._ground.texts import text, whole_characters
-from twinloop._ground.versions import versions
+from twinloop._ground.texts import text
 from twinloop.campaign.differing import check_same
 from twinloop.campaign.history import Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
+from twinloop.campaign.provenance import provenance
 from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record
-from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened, shown_name
+from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened
 
 Answer = TypeVar("Answer")
 
@@ -221,71 +218,6 @@ def _of_store(
     if answer is None:
         raise InvalidInput(f"Store {store.name}: expected a campaign, found none; run one with store= first.")
     return answer
-
-
-def provenance(threads: int) -> Record:
-    """What results may be traced back to: versions and processor.
-
-    Args:
-        threads: of the engine.
-    """
-    return {
-        "threads": threads,
-        "machine": platform.machine(),
-        "processor": _processor(),
-        "vectors": _core.vector_widths(),
-        "system": platform.platform(),
-        "command": command_line(),
-        "versions": versions(),
-    }
-
-
-def command_line() -> list[str]:
-    """The command of this process as a person would type it, without passwords and tokens."""
-    return [whole_characters(shown_name(word)) for word in without_tokens(as_typed(sys.argv))]
-
-
-def without_tokens(words: Sequence[str]) -> list[str]:
-    """A command of which nobody reads what opens its dashboard.
-
-    Args:
-        words: of it.
-    """
-    before = ["", *words]
-    return [
-        "***" if last == "--token" else "--token=***" if word.startswith("--token=") else word
-        for last, word in zip(before, words, strict=False)
-    ]
-
-
-def as_typed(words: Sequence[str]) -> list[str]:
-    """A command as a person would type it: the programme without the folders of this machine.
-
-    Args:
-        words: as a process gets them, the programme first; or as this function gave them.
-
-    Returns:
-        "twinloop" and its words; of a script "python", its name and its words.
-    """
-    path, *rest = words or [""]
-    if path == "python":
-        return list(words)
-    name = Path(path).name
-    if name == "__main__.py":
-        module = Path(path).parent.name
-        return [module, *rest] if module == "twinloop" else ["python", "-m", module, *rest]
-    if Path(path).stem == "twinloop":
-        return ["twinloop", *rest]
-    return ["python", *([name] if name else []), *rest]
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor()
 
 
 def _check_name(name: object) -> None:

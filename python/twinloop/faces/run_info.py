@@ -7,7 +7,7 @@ import time
 from datetime import datetime, timezone
 
 from twinloop._ground.versions import versions
-from twinloop.campaign.keeping import command_line
+from twinloop.campaign.provenance import command_line
 
 
 class Stopwatch:

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.keeping import as_typed, look, without_tokens
+from twinloop.campaign.keeping import look
+from twinloop.campaign.provenance import as_typed, without_tokens
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
 from twinloop.records.reading import from_text
