@@ -1,11 +1,14 @@
 """`campaign.run`: a test that is too risky is not flown, and one in which the system fails has failed."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
 from lives import CONTROLLER, SMALL
+from twinloop.logs.files import read_log
 
 
 class Failing(tl.System):
@@ -103,3 +106,63 @@ def test_a_rig_of_which_no_reading_moves_is_not_flown_on_before_somebody_has_loo
     assert rig.flights == 1 and [test.number for test in campaign.waiting] == [1]
     rig.mended = True
     assert len(campaign.run(rig, 3).experiments) == 3
+
+
+class Ending(tl.System):
+    """Ends its second run after a step, in some way."""
+
+    default_gains = PENDULUM_GAINS
+
+    def __init__(self, system, ended, reason):
+        self.system, self.ended, self.reason, self.count = system, ended, reason, 0
+
+    @property
+    def signals(self):
+        return self.system.signals
+
+    def run(self, test):
+        self.count += 1
+        run = self.system.run(test)
+        if self.count != 2:
+            return run
+        return tl.Trajectory(run.t[:2], run.states[:2], run.commands[:1], self.ended, self.reason)
+
+
+@pytest.mark.parametrize("ended", ["aborted", "diverged"])
+@pytest.mark.parametrize(("reason", "said"), [("left the rails", "left the rails"), ("", "ended at once")])
+def test_a_flight_that_ends_within_a_step_has_failed_and_is_not_flown_again(
+    new_campaign, pendulum, ended, reason, said
+):
+    rig = Ending(pendulum, ended, reason)
+    campaign = new_campaign().run(rig, 2)
+    assert [failure.reason for failure in campaign.failures] == [said]
+    assert rig.count == campaign.run(rig, 2).runs == 2
+
+
+def test_a_failure_without_words_is_told_by_its_kind(new_campaign, pendulum):
+    class Wordless(Failing):
+        def run(self, test):
+            if self.count == 0:
+                self.count += 1
+                raise tl.SystemFailure("")
+            return super().run(test)
+
+    campaign = new_campaign().run(Wordless(pendulum, set()), 3)
+    assert [failure.reason for failure in campaign.failures] == ["SystemFailure"]
+
+
+def test_a_flight_that_no_store_takes_is_written_to_a_file_which_can_be_told(
+    new_campaign, pendulum, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    campaign = new_campaign()
+    test = campaign.test(PENDULUM_GAINS)
+    full = tl.StoreFailure("The disk is full.")
+    with monkeypatch.context() as patch, pytest.raises(tl.StoreFailure, match=r"full.*flight-of-test-0\.csv"):
+        patch.setattr(type(campaign), "tell", Mock(side_effect=full))
+        campaign.run(pendulum, 1)
+    (file,) = tmp_path.iterdir()
+    log = read_log(file, pendulum.signals)
+    campaign.tell(test, log.trajectory())
+    (run,) = campaign.experiments
+    assert run.complete and run.trajectory.steps == test.steps

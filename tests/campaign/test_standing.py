@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 
-from logbooks import SETUPS, events, genes_of, planned, run_of, written
+from logbooks import SETUPS, events, genes_of, planned, run_of, trajectory, written
 from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign import standing
+from twinloop.campaign.data.gains import FlownOtherwise
+from twinloop.campaign.history import Experiment
 from twinloop.campaign.logbook import Logbook
 
 
@@ -214,3 +216,29 @@ def test_a_target_that_varies_is_the_task_only_where_it_varies_alike():
     assert standing.on_task(book, book.new_test(genes_of(0)))
     ramp = np.linspace([0.0, 0.0], setup.target_state, setup.steps + 1)
     assert not standing.on_task(book, book.new_test(genes_of(0), target_state=ramp))
+
+
+def test_an_excitation_that_was_left_out_was_not_borne():
+    book = Logbook(SETUPS["default"])
+    steps, commands = book.setup.steps, book.setup.signals.n_u
+    held = HoldBack(*(np.tile([-far, far], (book.setup.signals.n_x, 1)) for far in (1.0, 2.0)))
+    tests = [
+        book.new_test(genes_of(number), excitation=np.ones((steps, commands)), hold_back=held)
+        for number in range(2)
+    ]
+    book.enter(run_of(tests[0]))
+    assert standing.borne(book) == 1
+    book.enter(replace(run_of(tests[1]), replayed=replace(tests[1], excitation=None)))
+    assert standing.flies(book, 1) and standing.borne(book) == 1
+
+
+def test_other_gains_that_were_flown_and_cut_are_unfit_themselves():
+    book = Logbook(SETUPS["default"])
+    for number, kind in enumerate(("cut", "inside")):
+        test, run = book.new_test(genes_of(number)), trajectory(kind)
+        flown = FlownOtherwise(
+            test.signals, run.states[0], run.commands, asked=test, genes=genes_of(number) * 0.5
+        )
+        book.enter(Experiment(flown, run, None, 1.0, None, None))
+    assert (genes_of(0) * 0.5).tolist() in [genes.tolist() for genes in standing.unfit(book)]
+    assert (genes_of(1) * 0.5).tolist() not in [genes.tolist() for genes in standing.unfit(book)]

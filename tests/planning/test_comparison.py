@@ -13,6 +13,7 @@ from twinloop.planning.candidates import candidates
 from twinloop.planning.comparison import TRIED, Comparison, _spaced
 from twinloop.planning.gusts import Moved
 from twinloop.planning.proposal import Flown, Wanted
+from twinloop.planning.reach import reach_of
 from twinloop.planning.seen import Seen
 
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
@@ -338,3 +339,25 @@ def test_where_the_gains_that_promise_most_bear_no_gust_some_on_the_way_back_fro
 ])  # fmt: skip
 def test_so_many_at_most_of_a_list_are_spaced_from_its_first_to_its_last(there, most, found):
     assert _spaced(range(there), most) == found
+
+
+def test_what_is_safest_is_never_the_tuned_gains_by_accident():
+    # Of the best gains flown a later flight has failed: nothing of them is flown again, and nothing at random either.
+    flown = replace(FLOWN, flies=True, failed=[FLOWN.best])
+    found = compared(replace(COMMITTEE, trusted=False), flown)
+    usage = found.quiet.worst_usage
+    (chosen, _) = found._safest()
+    assert found.possible[chosen] and usage[chosen] == usage[found.possible].min()
+    # A model on which everything diverges tells nothing: gains that were flown.
+    nothing = replace(COMMITTEE, members=[member(KNOWN, -60.0, -40.0)])
+    found = compared(nothing, replace(FLOWN, flies=True))
+    assert not np.isfinite(found.quiet.worst_usage).any()
+    assert same_bits(found.proposal().genes, FLOWN.best)
+
+
+@pytest.mark.parametrize("goal", ["both", "model"])
+def test_a_task_that_begins_far_out_is_within_reach_whatever_was_flown_before(goal):
+    flown, wanted = replace(FLOWN, usages=[0.05], begins=0.8), Wanted(goal, 1, False)
+    most = 1.0 - PLANNER.options.margin
+    assert 0.8 <= reach_of(flown, wanted, PLANNER.options) <= most
+    assert reach_of(replace(flown, begins=0.0), wanted, PLANNER.options) < 0.8

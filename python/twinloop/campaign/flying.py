@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from twinloop._ground.arrays import share, whole
 from twinloop._ground.texts import whole_characters
 from twinloop.campaign.assessment import latest_lesson
-from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
+from twinloop.campaign.rescue import rescued
+from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, StoreFailure, SystemFailure, TooRisky
 from twinloop.signals import Signals
 from twinloop.store.uninterrupted import uninterrupted
 from twinloop.systems import System
@@ -153,7 +154,7 @@ def _flown(campaign: Campaign, system: System, test: Test, timeout: float | None
     except NoAnswer:
         raise
     except SystemFailure as failure:
-        campaign.tell_failed(test, whole_characters(str(failure)))
+        campaign.tell_failed(test, whole_characters(str(failure)).strip() or type(failure).__name__)
         if again or not campaign.experiments:
             raise
         return True
@@ -192,8 +193,15 @@ def _record(campaign: Campaign, test: Test, landed: list[Trajectory]) -> None:
         if not landed:
             return
         trajectory = landed.pop()
-        if isinstance(trajectory, Trajectory) and trajectory.ended == "aborted" and trajectory.steps < 2:
-            # Ended before there was anything to learn from: that it was is the result.
-            campaign.tell_failed(test, trajectory.reason or "ended at once")
-        else:
-            campaign.tell(test, trajectory)
+        try:
+            _enter(campaign, test, trajectory)
+        except StoreFailure as failure:
+            raise StoreFailure(f"{failure} {rescued(test, trajectory)}") from failure
+
+
+def _enter(campaign: Campaign, test: Test, trajectory: Trajectory) -> None:
+    if isinstance(trajectory, Trajectory) and trajectory.ended != "completed" and trajectory.steps < 2:
+        # Ended before there was anything to learn from: that it was is the result.
+        campaign.tell_failed(test, trajectory.reason.strip() or "ended at once")
+    else:
+        campaign.tell(test, trajectory)

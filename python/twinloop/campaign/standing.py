@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.gains import FlownOtherwise
 from twinloop.campaign.history import Experiment, Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
 from twinloop.planning.proposal import Fared
@@ -127,20 +128,27 @@ def failed(book: Logbook, test: int) -> bool:
 
 
 def unfit(book: Logbook) -> list[Floats]:
-    """Genes of tests that failed on the system, or were cut.
+    """Genes of tests that failed on the system, or were cut; those that were flown, where they were others.
 
     Args:
         book: of the campaign.
     """
     flown = [number for number in sorted(book.flown) if _told(book, number)]
-    return [book.tests[number].genes for number in flown if not finishes(book, number)]
+    asked = [book.tests[number].genes for number in flown if not finishes(book, number)]
+    others = [
+        run.replayed.genes
+        for run in book.experiments
+        if isinstance(run.replayed, FlownOtherwise) and not run.complete
+    ]
+    return asked + others
 
 
 def borne(book: Logbook) -> int:
     """How many of the last tests in a row that were held back are known to fly: each bore a stronger excitation.
 
-    None counts whose states went on by half of the way to the envelope or more once the excitation was nothing:
-    holding back has not held it, and would not hold a stronger one.
+    One that was flown without its excitation shows nothing of it. None counts whose states went on by half of the way
+    to the envelope or more once the excitation was nothing: holding back has not held it, and would not hold a stronger
+    one.
 
     Args:
         book: of the campaign.
@@ -150,6 +158,9 @@ def borne(book: Logbook) -> int:
         if test.hold_back is None or not _told(book, test.number):
             continue
         runs = _runs(book, test.number)
+        flown = [run.test is None or run.test.excitation is not None for run in runs]
+        if test.excitation is not None and runs and not any(flown):
+            continue
         went_on = max((test.hold_back.overrun(signals, run.trajectory.states) for run in runs), default=0.0)
         if not flies(book, test.number) or went_on >= HELD:
             break

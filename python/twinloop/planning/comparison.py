@@ -121,11 +121,14 @@ class Comparison:
 
     def _safest(self) -> tuple[int, Judged]:
         """The candidate that uses least of the envelope, and its flights under noise."""
+        likely, repeats = self.possible, np.arange(len(self.possible)) >= self.drafts.repeats
         # What was flown and kept the envelope will again, whatever the members make of it.
-        likely = self.possible
-        if self.flown.flies:
-            likely = likely & (np.arange(len(likely)) >= self.drafts.repeats)
-        chosen = int(np.argmin(np.where(likely, self.quiet.worst_usage, np.inf)))
+        if self.flown.flies and (likely & repeats).any():
+            likely = likely & repeats
+        usages = np.where(likely, self.quiet.worst_usage, np.inf)
+        # Where a member sees all of them diverge it tells nothing: the gains that were flown.
+        lasts = np.isfinite(usages).any()
+        chosen = int(np.argmin(usages)) if lasts else int(np.flatnonzero(likely)[-1])
         return chosen, self._noisy([chosen])
 
     def _allowed(self) -> tuple[float, float, float, float]:

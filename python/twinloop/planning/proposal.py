@@ -46,6 +46,7 @@ class Flown:
         fared: how these flights have ended.
         borne: how many of the last flights whose excitation was held back kept the envelope.
         seen: where the flights have been, as long as no prediction has come true.
+        begins: usage of the envelope where the task begins: flights of the task cannot have less.
     """
 
     best: Floats
@@ -57,6 +58,7 @@ class Flown:
     fared: Fared = Fared(1, 0)
     borne: int = 1
     seen: Seen | None = None
+    begins: float = 0.0
 
 
 @dataclass(frozen=True)

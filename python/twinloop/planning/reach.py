@@ -22,7 +22,9 @@ def reach_of(flown: Flown, wanted: Wanted, options: PlanningOptions) -> float:
         options: of the planning.
     """
     used = flown.usages
-    first, most = used[0] if used else 0.0, max(used, default=0.0)
+    # Where the task begins no flight of it can use less, whatever was flown before of others.
+    first = max(used[0] if used else 0.0, flown.begins)
+    most = max([flown.begins, *used])
     # A model is believed near what was flown: each flight may go on by a share of what is left beyond those before it.
     # That of these much has come true tells nothing of what is there: a wing has not stalled until it does.
     left = max(0.0, 1.0 - options.margin - most)

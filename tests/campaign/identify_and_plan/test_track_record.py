@@ -67,6 +67,7 @@ def test_two_flights_in_a_row_that_were_worse_than_promised_count(ratios, answer
         ([experiment(0.981, 1.0, 0.01)], True),
         ([experiment(0.979, 1.0, 0.01)], False),
         ([experiment(0.98, None, 0.01)], False),
+        ([experiment(np.inf, 1.0, np.inf)], False),
         ([experiment(0.98, 1.0, None)], False),
         ([experiment(0.5), experiment(1.0)], True),
         ([experiment(1.0), experiment(0.5), experiment(None)], False),
@@ -78,7 +79,13 @@ def test_the_last_flight_that_was_predicted_confirms_within_two_spreads(runs, an
 
 @pytest.mark.parametrize(
     ("predicted", "spread", "quality", "true"),
-    [(1.0, 0.1, 1.19, True), (1.0, 0.1, 1.3, False), (1.0, 0.0, 1.05, True), (None, None, 1.0, False)],
+    [
+        (1.0, 0.1, 1.19, True),
+        (1.0, 0.1, 1.3, False),
+        (1.0, 0.0, 1.05, True),
+        (None, None, 1.0, False),
+        (np.inf, np.inf, 1.0, False),
+    ],
 )
 def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread, quality, true):
     run = flight(predicted, spread, quality, 1.0)

@@ -169,7 +169,10 @@ class Choice:
         """Whether every member flies to the bit as well in two corners of the gains' box as with the tuned ones."""
         family = self.planner.family
         corners = np.stack([family.from_unit(np.full(family.size, place)) for place in (0.0, 1.0)])
-        return bool((self._judge(members, corners).qualities == judged.qualities[:, :, :1]).all())
+        qualities = judged.qualities[:, :, :1]
+        return bool(
+            np.isfinite(qualities).all() and (self._judge(members, corners).qualities == qualities).all()
+        )
 
     def _not_preferred(self, recorded: Floats, tuned: Floats, flown: Test, better: float) -> str:
         """Why the best gains flown are better than those tuned; nothing if they are not."""

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from twinloop import _core
+from twinloop._experiment.envelope import usages_of
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
@@ -25,6 +26,7 @@ from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
 from twinloop.campaign.identify_and_plan.starts import first_genes, known_gains, starts_of
 from twinloop.campaign.identify_and_plan.track_record import nearly_confirmed_in_a_row, unproven_risk
+from twinloop.campaign.identify_and_plan.wrong_readings import without_wrong_readings
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -221,26 +223,27 @@ class IdentifyAndPlan:
         good = None
         if best is not None and known and standing.on_task(book, best):
             good = standing.measured(book, best.number)
+        # One wrong reading is no place where a flight has been.
+        flights = without_wrong_readings(book.experiments, self.setup.signals)
         return Flown(
             tuned if best is None else best.genes,
             known,
-            [run.usage for run in book.experiments if run.kept_envelope]
-            or [run.usage for run in book.experiments],
+            [run.usage for run in flights if run.kept_envelope] or [run.usage for run in flights],
             float("inf") if good is None else good,
             standing.unfit(book),
             times=1 if best is None else standing.times_flown(book, best.genes),
             fared=Fared(0, 0) if best is None else standing.fared(book, best.genes, excited=True),
             borne=standing.borne(book),
             seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
+            begins=float(usages_of(self.setup.signals, self.setup.initial_state[np.newaxis]).max()),
         )
 
     def _seen(self, book: Logbook) -> Seen:
         """Where the flights have been, and where the task leads."""
         setup = self.setup
         ends = np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
-        return Seen(
-            standing.read_in(book, inside(book.experiments)), np.stack([ends.min(axis=0), ends.max(axis=0)])
-        )
+        flights = inside(without_wrong_readings(book.experiments, setup.signals))
+        return Seen(standing.read_in(book, flights), np.stack([ends.min(axis=0), ends.max(axis=0)]))
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
@@ -271,12 +274,14 @@ class IdentifyAndPlan:
         """
         if not committee.predicts_limits:
             return tuned
-        flown = self._flown(book, standing.best_flown(book), tuned)
+        best = standing.best_flown(book)
+        flown = self._flown(book, best, tuned)
         if flown.seen is None and self.planner.is_near(committee, tuned, flown):
             return tuned
         goal, number = self.setup.goal, len(book.tests)
         found = self.planner.propose(committee, tuned, flown, goal, number, exploit=True, last=True)
-        return found.genes if found.safe else tuned
+        # What may not be tried is not recommended either.
+        return found.genes if found.safe or best is not None else tuned
 
     def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
         """A gentle chirp that fades out, held back by what the states do."""
@@ -332,11 +337,8 @@ class IdentifyAndPlan:
         )
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
-        """The best law where what states do ends where flights and the task have been; none after a first flight.
-
-        That one is gentle: gains that do better lead where it has not been.
-        """
-        if not self.options.ends or len(book.experiments) < 2:
+        """The best law where what states do ends where flights and the task have been; None where that is off."""
+        if not self.options.ends:
             return None
         return ending(latest.believed[0], self.setup.signals, self._seen(book).both)
 
