@@ -45,7 +45,8 @@ class PlanningOptions:
         reach_growth: largest ratio of the usage of a flight for the model to that of the first flight.
         reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
             flights have moved them, until a prediction has come true; 0: anywhere.
-        ends: whether new gains must keep the envelope also if what states do ends where flights and the task have been.
+        ends: whether new gains must keep the envelope also if what states do ends where flights and the task have been;
+            after a single flight, as far again.
         evaluations: number of flights on which gains are tuned at most, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.

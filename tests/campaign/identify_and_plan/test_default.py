@@ -382,29 +382,30 @@ def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further
         assert same_bits(campaign.best_test.genes, campaign._method._gains(campaign._book))
 
 
-def test_from_the_third_flight_on_gains_must_bear_that_what_states_do_ends_where_flights_and_task_were(
-    begin, pendulum
+@pytest.mark.parametrize(("flights", "again"), [(1, 1.0), (2, 0.0)])
+def test_gains_must_bear_that_what_states_do_ends_where_flights_and_task_were_or_after_one_flight_as_far_again(
+    begin, pendulum, flights, again
 ):
     campaign = begin()
     test = campaign.test(PENDULUM_GAINS)
-    for told_so_far in range(3):
-        if told_so_far:
-            _ = campaign.twin
-            method, book = campaign._method, campaign._book
-            ended = method._committee(book).ending
-            assert (ended is None) == (told_so_far == 1)
-            test = campaign.ask()
+    for _ in range(flights):
         campaign.tell(test, pendulum.run(test))
-    readings = np.concatenate([run.trajectory.states for run in book.experiments[:2]])
+        test = campaign.ask()
+    method, book = campaign._method, campaign._book
+    ended = method._committee(book).ending
+    readings = np.concatenate([run.trajectory.states for run in book.experiments])
     ends = np.array([book.setup.initial_state, book.setup.target_state])
-    highest = np.maximum(readings.max(axis=0), ends.max(axis=0))
+    far = np.ptp(readings, axis=0)
+    highest = np.maximum(readings.max(axis=0), ends.max(axis=0)) + again * far
 
     def moved(law, beyond):
-        """By how much the rate changes in a period, from so far beyond what was seen."""
-        return law.step([highest + beyond], [[0.0]])[0, 1] - highest[1] - beyond
+        """By how much the rate changes in a period, from so far beyond where the law ends."""
+        place = highest + beyond
+        return law.step([place], [[0.0]])[0, 1] - place[1]
 
     # Beyond, states do what they did at their ends; the law itself goes on.
     assert moved(ended, 10.0) == pytest.approx(moved(ended, 20.0), rel=1e-9)
+    assert moved(ended, -0.4 * far) == moved(method._committee(book).members[0], -0.4 * far)
     assert abs(moved(method._committee(book).members[0], 10.0) - moved(ended, 10.0)) > 0.1
 
 
@@ -646,3 +647,19 @@ def test_a_flight_of_another_task_is_not_given_back_as_the_best(begin, pendulum)
     # What was measured on the way to another target is not the quality of this one.
     assert best.measured in [None, *(run.quality for run in flown)]
     assert standing.best_flown(campaign._book).number == min(flown, key=lambda run: run.quality).test.number
+
+
+def test_gains_that_may_not_be_tried_yet_are_not_recommended_either(begin, pendulum):
+    campaign = told(begin(), pendulum)
+    _ = campaign.twin  # learns
+    method, book = campaign._method, campaign._book
+    committee, best = method._committee(book), standing.best_flown(book)
+    tuned = best.genes * 1.01
+    far = mock.patch.object(Planner, "is_near", lambda *given: False)
+    for safe, genes in ((True, best.genes * 1.005), (False, best.genes)):
+        unsafe = mock.patch.object(
+            Planner, "propose", lambda *given, s=safe, g=genes, **more: mock.Mock(safe=s, genes=g)
+        )
+        limits = mock.patch.object(type(committee), "predicts_limits", True)
+        with far, unsafe, limits:
+            assert same_bits(method._within_reach(committee, tuned, book), genes)

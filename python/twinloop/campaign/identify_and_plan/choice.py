@@ -177,7 +177,7 @@ class Choice:
     def _not_preferred(self, recorded: Floats, tuned: Floats, flown: Test, better: float) -> str:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
-            return "the twin finds no better ones"
+            return "the twin finds no better ones that may be flown now"
         alone = self._measured_alone(flown) if self.planner.options.track_record else None
         of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
         if alone is not None and (spoken := self._spoken_against(alone, flown, of_others)):

@@ -47,6 +47,9 @@ TOLERATED = 0.5
 """Share that is left of the delay that gains have to tolerate, after each prediction that came true."""
 TUNED_WITH = 0.25
 """The same of the delay with which they are tuned: to fly well with it costs quality without it."""
+AS_FAR_AGAIN = 1.0
+"""Times as far as a single flight moved each state, beyond it and the task, up to which its law is believed not to end.
+With nothing a heater is tuned a flight later; with 2 a car that lost its grip in its second flight loses it still."""
 
 
 class IdentifyAndPlan:
@@ -337,10 +340,15 @@ class IdentifyAndPlan:
         )
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
-        """The best law where what states do ends where flights and the task have been; None where that is off."""
+        """The best law where what states do ends where flights and the task have been; None where that is off.
+
+        After a single flight, as far again: that one is gentle, and gains that do better lead where it has not been.
+        """
         if not self.options.ends:
             return None
-        return ending(latest.believed[0], self.setup.signals, self._seen(book).both)
+        seen, signals = self._seen(book), self.setup.signals
+        bounds = seen.both if len(book.experiments) > 1 else seen.around(AS_FAR_AGAIN, signals)
+        return ending(latest.believed[0], signals, bounds)
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
         """Disturbances that are known, drawn once for each lesson; none that are known to be a model error."""
