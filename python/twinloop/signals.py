@@ -419,6 +419,18 @@ class Signals(Value, Recorded, kind="signals"):
         )
 
 
+def rates(signals: Signals) -> set[int]:
+    """Places of the states that are declared derivatives or body rates.
+
+    Args:
+        signals: of the system.
+    """
+    body = () if signals.kinematics is None else signals.kinematics.rates
+    return {
+        i for i, state in enumerate(signals.states) if state.derivative_of is not None or state.name in body
+    }
+
+
 def ordered(what: str, bounds: object) -> Bounds:
     """Two finite numbers, the smaller first.
 

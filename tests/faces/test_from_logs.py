@@ -97,6 +97,9 @@ def test_without_a_log_held_out_the_page_does_not_say_to_trust_it(folder):
     page = folder / "all.html"
     assert identified(folder, "--report", str(page)).exit_code == 0
     assert "Do not trust it" in page.read_text()
+    # Logs have no target: what is said of a point says which.
+    assert "Poles of the twin in the middle of the envelope" in page.read_text()
+    assert "at the target" not in page.read_text().partition("Poles of the twin")[2].partition("</table>")[0]
 
 
 def test_a_log_that_cannot_be_learnt_names_itself_and_what_to_do(folder):

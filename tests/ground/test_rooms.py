@@ -54,7 +54,7 @@ FRONTS = {
     ),
     "law/exports": "environment export gymnasium_source taking",
     "law/exports/fmu": "running unit",
-    "law/linear": "margins plant state_space storage",
+    "law/linear": "friction margins plant state_space storage",
     "planning": "excitation gains gusts judging leaving planner proposal quality scored seen settings",
     "records": "reading",
     "reproduce": "command",

@@ -525,7 +525,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Each loop is broken at one place while the others stay closed. The loops are in discrete time, with the delays
         and lags of actuators. The twin is linearised at the target under the command that holds it, the controller at
-        zero error.
+        zero error. Dry friction damps strongly there, as long as it sticks, and not at all as it slides: each margin is
+        the worse of the two.
 
         Args:
             parameters: gains of the controller, by name or in order; None: those of `best_test`.
@@ -540,7 +541,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
         """
         genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
         loops, names = loops_around(self.twin, self.setup, genes, broken_at)
-        return margins_of(loops, names, broken_at)
+        sliding, _ = loops_around(self.twin, self.setup, genes, broken_at, slides=True)
+        return margins_of(loops, names, broken_at, sliding)
 
     def export_twin(
         self, to: str | Path, *, kind: str | None = None, precision: str = "double", force: bool = False

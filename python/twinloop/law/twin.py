@@ -422,7 +422,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
         """The twin around a point, by exact derivatives of its equations.
 
-        Actuators are at rest under the command of the point; hidden states are 0, or where the state settles them.
+        Actuators are at rest under the command of the point; hidden states are 0, or where the state settles them. Dry
+        friction has its slope there: at rest it is a strong damper, but of the slowest motion alone.
 
         Args:
             at: state (n_x,), SI units, radians.

@@ -212,7 +212,7 @@ def test_the_least_movement_is_that_of_the_state_that_moved_least_in_its_best_fl
 @pytest.mark.parametrize(("delay", "verdict"), [(0.049, "failed"), (0.051, "passed"), (np.inf, "passed")])
 def test_a_loop_that_bears_less_than_a_period_of_delay_is_not_flown(good, delay, verdict):
     (loop,) = good.examine().margins.worst
-    check = _delay(dataclasses.replace(loop, delay=delay), 0.05)
+    check = _delay(dataclasses.replace(loop, delay=delay), 0.05, 20, True)
     assert check.verdict == verdict and check.binding
     assert (loop.loop in check.sentence) == np.isfinite(delay)
 

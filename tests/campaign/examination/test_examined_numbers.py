@@ -13,6 +13,7 @@ import scipy.signal
 import lives
 import twinloop as tl
 from conftest import pendulum_step
+from law_twins import SWINGING, twin_of
 from twinloop._experiment.envelope import usages_of
 from twinloop.campaign.examination.data import fingerprint
 from twinloop.campaign.examination.frequency import frequency_responses
@@ -21,6 +22,9 @@ from twinloop.campaign.examination.poles import poles
 from twinloop.campaign.examination.steps import moved_states, step_answer
 from twinloop.campaign.examination.use import effort, envelope_use, gain_slopes, outside_of
 from twinloop.faces.figures.use import gains
+from twinloop.faces.report.tables.controller import margins as margins_table
+from twinloop.faces.report.tables.twin import closed_poles
+from twinloop.faces.report.tables.twin import poles as tables_of_poles
 from twinloop.objectives import normalised_error
 
 STREAM = np.random.default_rng(11)
@@ -112,6 +116,27 @@ def test_curves_of_a_loop_reach_the_sensitivity_of_its_margins(good):
     for curves, margins in zip(found.loops, found.margins.nominal, strict=True):
         assert curves.sensitivity[0].max() == pytest.approx(margins.sensitivity, rel=0.02)
         assert len(curves.open) == 1 + len(good.twin.members)
+
+
+def test_what_is_drawn_of_a_twin_with_dry_friction_is_first_how_it_slides_then_how_it_sticks(good):
+    strong = [line.replace("r2 * 5.0", "r2 * 25.0") for line in SWINGING]
+    swings = [*strong, "r5 = r1 * 40.0", "r5 = tanh(r5)", "r5 = r5 * 0.5", "r3 = r3 - r5"]
+    found = good.examine()
+    found.twin = twin_of(swings, signals=good.signals, inputs=3)
+    for free, slope in ((found.sliding_open_poles, 0.4), (found.open_poles, 0.4 + 40.0 * 0.5)):
+        pull = 9.0 * math.cos(found.setup.final_target[0])
+        expected = poles(np.linalg.eigvals([[0.0, 1.0], [-pull, -slope]]))
+        assert [pole.real for pole in free] == pytest.approx([pole.real for pole in expected])
+    slides, sticks = found.sliding_closed_poles, found.closed_poles
+    assert sum(pole.damping for pole in slides) < sum(pole.damping for pole in sticks)
+    (curves,), (margins,) = found.loops, found.margins.nominal
+    assert len(curves.open) == len(found.responses[0].twin) == 2
+    assert margins.friction == "sliding"
+    assert curves.sensitivity[0].max() == pytest.approx(margins.sensitivity, rel=0.02)
+    tables = [table.title for table in (*tables_of_poles(found, True), *closed_poles(found))]
+    assert [title.rpartition(" ")[2] for title in tables] == ["sticking", "sliding"] * 2
+    assert margins_table(found).head[-1] == "dry friction"
+    assert {row[-1] for row in margins_table(found).rows} == {"sliding"}
 
 
 def test_poles_are_read_with_their_damping_and_time():

@@ -10,6 +10,7 @@ from twinloop._ground.texts import two_digits
 from twinloop._ground.times import shown_time
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.examination.late import MOST
 from twinloop.campaign.examination.reaching import REACHED, Ending
 from twinloop.law.linear.margins import LoopMargins
 from twinloop.planning.leaving import risk_words
@@ -145,17 +146,22 @@ def _damping(worst: LoopMargins) -> Check:
     )  # fmt: skip
 
 
-def _delay(worst: LoopMargins, dt: float) -> Check:
+def _delay(worst: LoopMargins, dt: float, flown: int, bounded: bool) -> Check:
+    """The delay that both the loops around the target bear, for small departures, and the flight of the task."""
     periods = worst.delay / dt
+    slides = ", as dry friction slides," if worst.friction == "sliding" else ""
     borne = (
-        f"The loop with the smallest delay margin, {worst.loop}, stays stable with up to"
+        f"The loop with the smallest delay margin, {worst.loop}, stays stable{slides} with up to"
         f" {shown_time(worst.delay)} more, {periods:.3g} periods"
         if math.isfinite(periods)
         else "No delay makes any loop unstable"
     )
+    keeps = "stays in the envelope" if bounded else "does not diverge"
+    found = min(periods, float(flown))
     return Check(
-        "delay", "controller", periods, PERIODS, periods >= PERIODS, True,
-        f"{borne}; at least {PERIODS:g} is required, since a command may be that late.",
+        "delay", "controller", found, PERIODS, found >= PERIODS, True,
+        f"{borne}; the flight of the task {keeps} on any model with up to {flown} periods more, of {MOST} that were"
+        f" tried. At least {PERIODS:g} is required of both, since a command may be that late.",
     )  # fmt: skip
 
 
@@ -178,7 +184,7 @@ def _of_controller(found: Examination) -> Iterator[Check]:
     if best is None:
         return
     # Loops around a twin that does not follow its own flights say nothing of the system's, and `follows` binds already.
-    margins = found.margins if found.twin.follows else None
+    margins, bounded = found.margins if found.twin.follows else None, is_bounded(found.signals)
     if margins is None and found.twin.follows:
         yield from _without_margins(found.no_margins)
     if margins is not None:
@@ -190,8 +196,8 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
         if stable:  # of a loop that is not, a sensitivity says nothing
             yield _damping(max(margins.worst, key=lambda loop: loop.sensitivity))
-            yield _delay(min(margins.worst, key=lambda loop: loop.delay), found.signals.dt)
-    bounded = is_bounded(found.signals)
+            least = min(margins.worst, key=lambda loop: loop.delay)
+            yield _delay(least, found.signals.dt, found.delay_borne, bounded)
     if not bounded:
         yield Check(
             "no-envelope", "controller", None, None, False, False,

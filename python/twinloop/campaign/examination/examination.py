@@ -21,6 +21,7 @@ from twinloop.campaign.examination.correlation import (
 )
 from twinloop.campaign.examination.data import DataQuality, data_quality, movements
 from twinloop.campaign.examination.frequency import Responses, frequency_responses
+from twinloop.campaign.examination.late import periods_borne
 from twinloop.campaign.examination.learning import ErrorMap, error_map
 from twinloop.campaign.examination.loops import (
     ClosedCurves,
@@ -44,7 +45,10 @@ from twinloop.campaign.examination.use import (
 )
 from twinloop.campaign.history import Experiment
 from twinloop.errors import NotAvailable
+from twinloop.law.law import Law
+from twinloop.law.linear.friction import has_friction, sliding
 from twinloop.law.linear.margins import Loops, Margins, margins_of
+from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.twin import Twin
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory, continued
@@ -79,7 +83,7 @@ class Frequency:
         input: name of the axis or command.
         state: that this input moves most.
         frequencies: of the twin's response (f,), rad/s.
-        twin: complex gains (models, f), the twin's first.
+        twin: complex gains (models, f), the twin's first; with dry friction all as it slides, then as it sticks.
         flown: responses that the flights show.
         place: of the input and the state in `flown`.
     """
@@ -168,19 +172,30 @@ class Examination:
         known = {before.learnt: before.twin.model for before in self.twins_before}
         return error_map(self.campaign.history, self.experiments, known, self._error)
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether the twin has dry friction, which damps strongly as it sticks, and not at all as it slides."""
+        return has_friction(self.twin.law)
+
     @cached_property
     def open_poles(self) -> tuple[Pole, ...]:
-        """Poles of the twin at the target; empty if it cannot be linearised there."""
+        """Poles of the twin at the target, as dry friction sticks; empty if it cannot be linearised there."""
+        return self._open_poles(self.twin.law)
+
+    @cached_property
+    def sliding_open_poles(self) -> tuple[Pole, ...]:
+        """The same as dry friction slides; empty without any."""
+        if not self.has_friction:
+            return ()
+        return self._open_poles(sliding(self.twin.law, self.setup.final_target))
+
+    def _open_poles(self, law: Law) -> tuple[Pole, ...]:
+        target, discrete = self.setup.final_target, law.form != "acceleration"
         try:
-            return self._open_poles()
+            plant = linearised(law, target, trimmed(law, target, resting(law)), discrete)
         except NotAvailable:
             return ()
-
-    def _open_poles(self) -> tuple[Pole, ...]:
-        if self.twin.model.form == "acceleration":
-            return poles(np.linalg.eigvals(self.twin.linearise(self.setup.final_target).A))
-        discrete = self.twin.linearise(self.setup.final_target, discrete=True)
-        return poles(np.linalg.eigvals(discrete.A), self.signals.dt)
+        return poles(np.linalg.eigvals(plant.A), plant.dt)
 
     @cached_property
     def data(self) -> tuple[DataQuality, ...]:
@@ -232,13 +247,20 @@ class Examination:
 
     @cached_property
     def _found_loops(self) -> tuple[list[Loops], Sequence[str]] | str:
-        """The loops with their names, or why there are none."""
+        """The loops with their names, dry friction sticking, or why there are none."""
         if self.best is None:
             return self.no_controller
         try:
             return loops_around(self.twin, self.setup, self.best.genes, "axes")
         except NotAvailable as reason:
             return str(reason)
+
+    @cached_property
+    def _sliding(self) -> list[Loops]:
+        """The same loops as dry friction slides; empty without any."""
+        if self.best is None or self._loops is None:
+            return []
+        return loops_around(self.twin, self.setup, self.best.genes, "axes", slides=True)[0]
 
     @property
     def _loops(self) -> tuple[list[Loops], Sequence[str]] | None:
@@ -252,30 +274,55 @@ class Examination:
     @cached_property
     def margins(self) -> Margins | None:
         """Of the controller to fly, at the target; None if it or the twin cannot be linearised there."""
-        return None if self._loops is None else margins_of(*self._loops, "axes")
+        return None if self._loops is None else margins_of(*self._loops, "axes", self._sliding)
+
+    @cached_property
+    def delay_borne(self) -> int:
+        """Periods of more delay that the planned flight bears on all models; 0 without a controller."""
+        if self.best is None:
+            return 0
+        return periods_borne([self.twin.model, *self.twin.members], self.best.quiet(), self.twin.limits)
 
     @cached_property
     def loops(self) -> tuple[LoopCurves, ...]:
-        """Each loop over frequency; empty without margins."""
-        return () if self._loops is None else loop_curves(*self._loops)
-
-    @cached_property
-    def closed(self) -> ClosedCurves | None:
-        """Effect of sensor noise on commands and of disturbances on states; None without margins."""
-        return None if self._loops is None else closed_curves(self._loops[0][0], self.setup, self.twin.noise)
-
-    @cached_property
-    def closed_poles(self) -> tuple[Pole, ...]:
-        """Poles of the twin's closed loops."""
-        return () if self._loops is None else poles(self._loops[0][0].closed_poles(), self.signals.dt)
-
-    @cached_property
-    def responses(self) -> tuple[Frequency, ...]:
-        """For each axis, or command, the state that it moves most: the twin at the target, and the flights."""
+        """Each loop over frequency, with dry friction also of each model as it slides; empty without margins."""
         if self._loops is None:
             return ()
         loops, names = self._loops
-        dt = self.signals.dt
+        return loop_curves([*self._sliding, *loops], names)
+
+    @cached_property
+    def closed(self) -> ClosedCurves | None:
+        """Effect of sensor noise on commands and of disturbances on states; None without margins.
+
+        With dry friction as it slides: what moves a state at all has overcome it.
+        """
+        if self._loops is None:
+            return None
+        return closed_curves([*self._sliding, *self._loops[0]][0], self.setup, self.twin.noise)
+
+    @cached_property
+    def closed_poles(self) -> tuple[Pole, ...]:
+        """Poles of the twin's closed loops, as dry friction sticks."""
+        return () if self._loops is None else poles(self._loops[0][0].closed_poles(), self.signals.dt)
+
+    @cached_property
+    def sliding_closed_poles(self) -> tuple[Pole, ...]:
+        """The same as dry friction slides; empty without any."""
+        if not self.has_friction or not self._sliding:
+            return ()
+        return poles(self._sliding[0].closed_poles(), self.signals.dt)
+
+    @cached_property
+    def responses(self) -> tuple[Frequency, ...]:
+        """For each axis, or command, the state that it moves most: the twin at the target, and the flights.
+
+        With dry friction first as it slides, as it does in flights.
+        """
+        if self._loops is None:
+            return ()
+        names, dt = self._loops[1], self.signals.dt
+        loops = [*self._sliding, *self._loops[0]]
         frequencies = np.geomspace(2e-3 * np.pi / dt, np.pi / dt * (1.0 - 1e-9), 200)
         found = [loop.plant.response(frequencies)[:, : self.signals.n_x] @ loop.of_axes for loop in loops]
         inputs = [self._of_axes(run.trajectory.commands) for run in self.experiments]

@@ -11,6 +11,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.setup import Setup
 from twinloop.errors import unknown
 from twinloop.law.law import Law
+from twinloop.law.linear.friction import has_friction, sliding
 from twinloop.law.linear.margins import Loops, closed_loops
 from twinloop.law.noise import Noise
 from twinloop.law.twin import Twin
@@ -25,7 +26,7 @@ FAR = 1000.0
 
 
 def loops_around(
-    twin: Twin, setup: Setup, genes: Floats, broken_at: str
+    twin: Twin, setup: Setup, genes: Floats, broken_at: str, slides: bool = False
 ) -> tuple[list[Loops], Sequence[str]]:
     """The loops of a controller around a twin and the members of its committee, at the target of a campaign.
 
@@ -34,9 +35,11 @@ def loops_around(
         setup: of the campaign.
         genes: gains of the controller (size,).
         broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+        slides: whether dry friction slides there; otherwise it sticks, as it does at rest.
 
     Returns:
-        The loops of the twin, then of each member; and a name for each place where they are broken.
+        The loops of the twin, then of each member, none if friction is to slide and no model has any; and a name for
+        each place where they are broken.
 
     Raises:
         InvalidInput: another place.
@@ -51,6 +54,10 @@ def loops_around(
         axes = getattr(setup.controller, "axes", None)
         names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
     laws = [twin.law, *(Law.of(member, signals) for member in twin.members)]
+    if slides:
+        if not any(map(has_friction, laws)):
+            return [], names
+        laws = [sliding(law, setup.final_target) for law in laws]
     family = setup.controller.bind(_without_bounds(signals))
     return closed_loops(laws, family, genes, setup.final_target, mixer, broken_at), names
 
@@ -72,7 +79,7 @@ class LoopCurves:
     Args:
         loop: its name.
         frequencies: (f,), rad/s.
-        open: L (models, f), the twin's first.
+        open: L (models, f), the twin's first; with dry friction all as it slides, then as it sticks.
     """
 
     loop: str
@@ -122,7 +129,7 @@ def loop_curves(loops: Sequence[Loops], names: Sequence[str]) -> tuple[LoopCurve
     """Each loop over frequency.
 
     Args:
-        loops: of the twin, then of the members.
+        loops: of the twin, then of the others.
         names: of the places where they are broken.
     """
     frequencies = _frequencies(loops[0].dt)

@@ -46,7 +46,8 @@ def bode(found: Examination) -> Figure | None:
         panels,
         "The twin is linearised at the target, the flights are whole manoeuvres: far from the target the two may"
         " differ. Dots are pale where the flights and the commands are not coherent, or where the sensors' noise is too"
-        " large a share of the reading: in closed loop noise goes back into the commands there.",
+        " large a share of the reading: in closed loop noise goes back into the commands there."
+        f"{_of_friction(found)}",
         columns=2,
     )
 
@@ -91,7 +92,7 @@ def nyquist(found: Examination) -> Figure | None:
         "Nyquist curves of the loops",
         panels,
         "Each loop is broken at one place while the others stay closed. A curve outside of the circle keeps the"
-        " sensitivity below 2.",
+        f" sensitivity below 2.{_of_friction(found)}",
     )
 
 
@@ -122,7 +123,8 @@ def sensitivities(found: Examination) -> Figure | None:
         "sensitivities",
         "Sensitivity and complementary sensitivity",
         panels,
-        "S: how feedback changes a disturbance, above 1 where it amplifies it; T: how the loop follows its target.",
+        "S: how feedback changes a disturbance, above 1 where it amplifies it; T: how the loop follows its target."
+        f"{_of_friction(found)}",
     )
 
 
@@ -153,8 +155,17 @@ def closed(found: Examination) -> Figure | None:
         "Effect of noise and disturbances",
         panels,
         "With all loops closed, root sum of squares over the states' sensors, and over the commands; in units of the"
-        " states' scales and the commands' half ranges.",
+        f" states' scales and the commands' half ranges.{' Dry friction slides.' if found.has_friction else ''}",
         columns=2,
+    )
+
+
+def _of_friction(found: Examination) -> str:
+    """What is drawn of dry friction."""
+    return (
+        " The twin's dry friction slides; pale are also all models as it sticks."
+        if found.has_friction
+        else ""
     )
 
 

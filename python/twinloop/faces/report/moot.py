@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from twinloop.campaign.examination.examination import Examination
 
-LINEAR = ("margins", "closed-poles", "nyquist", "sensitivities", "closed")
+LINEAR = ("margins", "closed-poles", "sliding-closed-poles", "nyquist", "sensitivities", "closed")
 """Tables and figures of the loops around the target."""
 FLOWN_ON_TWIN = ("effort", "envelope", "gains", "coverage")
 """Those that rest on the planned flight alone: the step is shown, with what was flown."""
@@ -20,7 +20,7 @@ def moot(found: Examination) -> Mapping[str, str]:
     """
     if not found.twin.follows:
         reason = "Not shown: the twin does not follow the flights that it was learnt from."
-        return dict.fromkeys((*LINEAR, *FLOWN_ON_TWIN, "bode", "poles"), reason)
+        return dict.fromkeys((*LINEAR, *FLOWN_ON_TWIN, "bode", "poles", "sliding-poles"), reason)
     reasons: dict[str, str] = {}
     if found.best is not None and found.planned is not None and found.planned.steps < found.best.steps:
         after = found.planned.t[-1] - found.planned.t[0]
@@ -29,6 +29,6 @@ def moot(found: Examination) -> Mapping[str, str]:
         )
     if found.margins is not None and not all(loop.stable for loop in found.margins.nominal):
         # The poles say how unstable.
-        loops = [name for name in LINEAR if name != "closed-poles"]
+        loops = [name for name in LINEAR if not name.endswith("poles")]
         reasons |= dict.fromkeys(loops, "Not shown: around the target the loops are unstable on the twin.")
     return reasons

@@ -110,11 +110,11 @@ def report_page(
         campaign_figures=_figures(found, CAMPAIGN),
         twin_tables=_present(
             of_twin.states(result), of_twin.disturbances(result), of_twin.actuators(result), of_twin.rivals(found),
-            *of_twin.poles(found)[:1], of_twin.ranges(found),
+            *of_twin.poles(found, controller), of_twin.ranges(found),
         ),
         controller_tables=_present(
             of_controller.gains(result), of_controller.margins(found), of_controller.steps(found),
-            of_controller.effort(found), of_controller.envelope(found), *of_twin.poles(found)[1:],
+            of_controller.effort(found), of_controller.envelope(found), *of_twin.closed_poles(found),
         ) if controller else [],
         campaign_tables=_present(
             *((cost_table(result, elapsed), of_flights.flights(result)) if controller else ()), of_flights.data(found)

@@ -17,8 +17,8 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, prices
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.terms.denominators import Denominator, plain, power_of
-from twinloop.identification.terms.libraries import angles, coordinates, rates
-from twinloop.signals import Signals
+from twinloop.identification.terms.libraries import angles, coordinates
+from twinloop.signals import Signals, rates
 
 EXPONENTS = (1, 2, 4)
 PLACES = (0.25, 0.5, 0.75)

@@ -10,13 +10,12 @@ from twinloop.identification.terms.libraries import (
     coordinates,
     periodic,
     quadratic,
-    rates,
     trigonometric,
     turn,
 )
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.expressions import CONSTANT
-from twinloop.signals import Signals
+from twinloop.signals import Signals, rates
 
 HIGHEST = 4
 """Power of a state below the line at most: of Hill's law for four places that bind together."""

@@ -18,11 +18,11 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
-from twinloop.identification.terms.libraries import periodic, rates
+from twinloop.identification.terms.libraries import periodic
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.expressions import CONSTANT, SHARE
 from twinloop.law.play import FIRM
-from twinloop.signals import Signals
+from twinloop.signals import Signals, rates
 
 PLACES = 16
 """Places that are tried between the least and the largest value of a coordinate, and as many among its readings."""

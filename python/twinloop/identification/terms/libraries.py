@@ -7,7 +7,7 @@ from itertools import combinations, combinations_with_replacement
 
 from twinloop.identification.terms.attitude import attitude
 from twinloop.identification.terms.pool import Pool
-from twinloop.signals import Signals, State
+from twinloop.signals import Signals, State, rates
 
 Terms = list[int]
 FRICTION = 30.0
@@ -158,14 +158,6 @@ def angles(signals: Signals) -> set[int]:
 def turn(state: State) -> float | None:
     """A whole turn of an angle in its unit: what it wraps by, or 360 in degrees; None: 2π, in rad."""
     return 360.0 if state.period is None and state.unit in DEGREES else state.period
-
-
-def rates(signals: Signals) -> set[int]:
-    """States that are declared derivatives or body rates."""
-    body = () if signals.kinematics is None else signals.kinematics.rates
-    return {
-        i for i, state in enumerate(signals.states) if state.derivative_of is not None or state.name in body
-    }
 
 
 def speeds(signals: Signals) -> list[list[int]]:

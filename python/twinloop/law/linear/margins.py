@@ -40,6 +40,7 @@ class LoopMargins:
         crossover: highest frequency at which the loop's gain is 1, rad/s; 0 if it is never 1.
         sensitivity: Ms, the largest |1 / (1 + L)|.
         complementary: Mt, the largest |L / (1 + L)|.
+        friction: whether dry friction is "sticking" or "sliding" where the delay is the smallest; "" without any.
     """
 
     loop: str
@@ -51,6 +52,7 @@ class LoopMargins:
     crossover: float
     sensitivity: float
     complementary: float
+    friction: str = ""
 
 
 class Loops:
@@ -123,8 +125,14 @@ class Loops:
         to_states = plant @ np.linalg.inv(np.eye(size) - law @ plant)
         return to_commands, to_states
 
-    def margins(self, loop: int, name: str) -> LoopMargins:
-        """Margins of one loop."""
+    def margins(self, loop: int, name: str, friction: str = "") -> LoopMargins:
+        """Margins of one loop.
+
+        Args:
+            loop: number of the axis or command.
+            name: of it.
+            friction: what dry friction does, "sticking" or "sliding"; "" without any.
+        """
         half = math.pi / self.dt
         frequencies = np.geomspace(SLOWEST * half, half * (1.0 - 1e-9), FREQUENCIES)
         values = self.response(loop, frequencies)
@@ -147,6 +155,7 @@ class Loops:
             crossover=max(crossings, default=0.0),
             sensitivity=float((1.0 / np.abs(1.0 + values)).max()),
             complementary=float(np.abs(values / (1.0 + values)).max()),
+            friction=friction,
         )
 
     def _crossings(
@@ -173,6 +182,9 @@ class Loops:
 class Margins:
     """Margins of the loops of a controller, by loop, each broken while the others stay closed; printable.
 
+    With dry friction each is the worse of two: as it sticks, where it damps like a strong damper, and as it slides,
+    where it damps nothing.
+
     Args:
         broken_at: "axes", between the law of each axis and the mixer, or "commands".
         nominal: of the twin.
@@ -198,8 +210,13 @@ class Margins:
                     f"{row.loop if which == 'twin' else '':>16}  {which:>7}  {row.gain:>8.3g}  {row.gain_down:>8.3g}"
                     f"  {math.degrees(row.phase):>9.3g}  {row.delay:>9.3g}  {row.crossover:>9.3g}"
                     f"  {row.sensitivity:>6.3g}  {row.complementary:>6.3g}{'' if row.stable else '  unstable'}"
+                    f"{row.friction and f'  {row.friction}'}"
                 )
         lines.append(f"worst: the worst of each over {self.members} model{'s' * (self.members != 1)}")
+        if any(row.friction for row in self.worst):
+            lines.append(
+                "each the worse of dry friction sticking and sliding; named is the one with less delay"
+            )
         return "\n".join(lines)
 
 
@@ -244,18 +261,28 @@ def _check_held(law: Law, controller: LinearController, held: Floats) -> None:
             )
 
 
-def margins_of(loops: Sequence[Loops], names: Sequence[str], broken_at: str) -> Margins:
+def margins_of(
+    loops: Sequence[Loops], names: Sequence[str], broken_at: str, sliding: Sequence[Loops] = ()
+) -> Margins:
     """Margins of all loops.
 
     Args:
         loops: of the twin, then of the members of its committee.
         names: of the places where they are broken.
         broken_at: "axes" or "commands".
+        sliding: the same as dry friction slides; empty where no model has any.
 
     Returns:
         Nominal and worst margins of each loop.
     """
-    rows = [[closed.margins(loop, name) for loop, name in enumerate(names)] for closed in loops]
+
+    def of(model: Loops, friction: str) -> list[LoopMargins]:
+        return [model.margins(loop, name, friction) for loop, name in enumerate(names)]
+
+    rows = [of(model, "sticking" if sliding else "") for model in loops]
+    if sliding:
+        slid = [of(model, "sliding") for model in sliding]
+        rows = [[worst(both) for both in zip(*pair, strict=True)] for pair in zip(rows, slid, strict=True)]
     return Margins(
         broken_at,
         tuple(rows[0]),
@@ -275,7 +302,7 @@ def worst(margins: Sequence[LoopMargins]) -> LoopMargins:
     """The worst of each margin of one loop over several laws.
 
     Args:
-        margins: of the same loop.
+        margins: of the same loop, at least one.
     """
     return LoopMargins(
         loop=margins[0].loop,
@@ -287,4 +314,5 @@ def worst(margins: Sequence[LoopMargins]) -> LoopMargins:
         crossover=max(each.crossover for each in margins),
         sensitivity=max(each.sensitivity for each in margins),
         complementary=max(each.complementary for each in margins),
+        friction=min(margins, key=lambda each: (each.stable, each.delay)).friction,
     )

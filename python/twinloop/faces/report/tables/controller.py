@@ -67,11 +67,21 @@ def margins(found: Examination) -> Table | None:
         "Mt",
         "stable",
     ]
+    slides = any(loop.friction for loop in loops.worst)
+    if slides:
+        head.append("dry friction")
+        every = (loop for pair in zip(loops.worst, loops.nominal, strict=True) for loop in pair)
+        rows = [[*row, loop.friction] for row, loop in zip(rows, every, strict=True)]
     note = (
         f"Each loop broken at the {loops.broken_at}, the others closed, at the target, with delays and lags; worst:"
         f" the worst of each over {loops.members} model{'s' * (loops.members != 1)} of the committee, which need not"
         " be one model's. A loop that is unstable on one of them has no margins."
     )
+    if slides:
+        note += (
+            " Each is the worse of two: with dry friction that sticks, and damps strongly, and that slides, and damps"
+            " nothing; named is the one that bears less delay."
+        )
     return table_of("margins", "Margins", head, rows, note)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from twinloop._ground.texts import in_unit
 from twinloop._ground.times import time_unit
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
@@ -120,18 +121,43 @@ def rivals(found: Examination) -> Table | None:
     return table_of("rivals", "Rival equations", head, rows, note, (2, 3))
 
 
-def poles(found: Examination) -> list[Table]:
-    """Of the twin alone, and closed."""
-    both = [
-        _poles(
-            "poles",
-            "Poles of the twin at the target",
-            found.open_poles,
-            "A negative time constant: unstable.",
-        ),
-        _poles("closed-poles", "Poles with the loops closed", found.closed_poles, ""),
+def poles(found: Examination, tuned: bool) -> list[Table]:
+    """Of the twin alone.
+
+    Args:
+        found: its examination.
+        tuned: whether a controller was to be tuned, for a target; logs alone have none.
+    """
+    note = "A negative time constant: unstable."
+    title = "Poles of the twin at the target"
+    if not tuned:
+        title = "Poles of the twin in the middle of the envelope"
+        point = zip(found.signals.states, found.setup.final_target.tolist(), strict=True)
+        values = ", ".join(
+            f"{words(state.name)} {in_unit(f'{factor * value:.4g}', unit)}"
+            for state, value in point
+            for factor, unit in [shown_unit(state.unit)]
+        )
+        note += f" At {values}: logs have no target, and where no envelope is declared the middle is 0."
+    return _sticking_and_sliding("poles", title, found.open_poles, found.sliding_open_poles, note)
+
+
+def closed_poles(found: Examination) -> list[Table]:
+    """Of the twin with the loops of its controller closed."""
+    return _sticking_and_sliding(
+        "closed-poles", "Poles with the loops closed", found.closed_poles, found.sliding_closed_poles, ""
+    )
+
+
+def _sticking_and_sliding(
+    name: str, title: str, sticking: Sequence[Pole], sliding: Sequence[Pole], note: str
+) -> list[Table]:
+    """A table of poles; with dry friction one as it sticks, and one as it slides."""
+    tables = [
+        _poles(name, f"{title}, dry friction sticking" if sliding else title, sticking, note),
+        _poles(f"sliding-{name}", f"{title}, dry friction sliding", sliding, "Beyond the smallest motions."),
     ]
-    return [table for table in both if table is not None]
+    return [table for table in tables if table is not None]
 
 
 def _poles(name: str, title: str, found: Sequence[Pole], note: str) -> Table | None:
