@@ -255,6 +255,21 @@ def test_gains_are_changed_one_at_a_time_within_their_box(good):
         )
 
 
+def test_a_gain_that_is_hardly_more_than_0_is_changed_as_one_of_0(good):
+    """± 20 % of 6e-5 of a range of 6 is nothing, too, and the quality may hang on the range."""
+    found = good.examine()
+    place = [gain.name for gain in good.family.gains].index("angle.ki")
+    gain = good.family.gains[place]
+    span = gain.high - gain.low
+    for share, of_range in ((1e-5, True), (0.009, True), (0.011, False)):
+        best = good.test({**found.best.parameters, "angle.ki": share * span}, excitation=None)
+        slope = gain_slopes(good.twin, good.setup, best)[place]
+        assert slope.of_range == of_range and slope.size == pytest.approx(span if of_range else share * span)
+        if of_range:
+            there = [quality for quality in slope.qualities if quality is not None]
+            assert max(there) > 1.01 * min(there)
+
+
 def test_a_gain_of_0_is_changed_by_a_share_of_its_range(good):
     """± 20 % of 0 is nothing: a flat line would say that the gain need not be exact."""
     found = good.examine()

@@ -20,7 +20,9 @@ AT_A_BOUND = 1e-6
 CHANGES = (-0.2, -0.1, 0.0, 0.1, 0.2)
 """Of one gain at a time, as shares of its value."""
 CHANGES_OF_NONE = (-0.05, -0.025, 0.0, 0.025, 0.05)
-"""Of a gain that is 0, as shares of its range: the usual value of a gain is a quarter of that."""
+"""Of a gain near 0, as shares of its range: the usual value of a gain is a quarter of that."""
+NEAR_NONE = 0.01
+"""Share of its range below which a gain is near 0; on a logarithmic scale none is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ class GainSlope:
         gain: its name.
         value: of the gain, in its unit.
         changes: of the gain, as shares of `size`.
-        size: the value; the range of the gain where the value is 0, of which no share is a change.
+        size: the value; the range of the gain where the value is near 0, of which no share is a change to speak of.
         of_range: whether it is the range.
         qualities: on the twin, without noise, for each change; infinite if the flight diverges; None beyond the
             gain's bounds.
@@ -101,7 +103,7 @@ def gain_slopes(twin: Twin, setup: Setup, best: Test) -> tuple[GainSlope, ...]:
     for i, gain in enumerate(setup.family.gains):
         value = float(best.genes[i])
         span = gain.high - gain.low
-        of_range = abs(value) <= AT_A_BOUND * span
+        of_range = not gain.logarithmic and abs(value) < NEAR_NONE * span
         changes, size = (CHANGES_OF_NONE, span) if of_range else (CHANGES, value)
         qualities: list[float | None] = []
         for change in changes:

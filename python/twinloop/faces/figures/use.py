@@ -68,7 +68,7 @@ def coverage(found: Examination) -> Figure | None:
 
 
 def gains(found: Examination) -> Figure | None:
-    """The quality on the twin against each gain, ± 20 %, or where that is nothing ± 5 % of its range."""
+    """The quality on the twin against each gain, ± 20 %, or where it is near 0 ± 5 % of its range."""
     if not found.slopes:
         return None
     panels = []
@@ -99,7 +99,11 @@ def gains(found: Examination) -> Figure | None:
             )
         )
     none = any(each.of_range for each in found.slopes)
-    of_none = " A gain of 0 is changed by shares of its range, as ± 20 % of 0 is nothing." if none else ""
+    of_none = (
+        " A gain of 0 is changed by shares of its range, as ± 20 % of 0 is nothing, and so is one below 1 % of it."
+        if none
+        else ""
+    )
     return Figure(
         "gains",
         "Quality against each gain, ± 20 %",
