@@ -1,5 +1,6 @@
 """The certificate of a controller: granted or refused with its reason, and the files that set gains or restore them."""
 
+import dataclasses
 import json
 from html.parser import HTMLParser
 
@@ -11,9 +12,10 @@ import twinloop as tl
 from browser import SIZES, browser, kept, opened, serious
 from conftest import PENDULUM_GAINS
 from lives import CONTROLLER, SIGNALS, SMALL
-from twinloop.campaign.certificate import certificate
+from twinloop.campaign.certificate import Use, certificate
 from twinloop.faces.certificate import _plots, facts, page
 from twinloop.faces.cli import main
+from twinloop.faces.report.tables.twin import ranges
 
 MAPPING = """
 [autopilot]
@@ -275,6 +277,35 @@ def pages(flown, tmp_path_factory):
     campaign.save(young)
     certify(young, folder / "refused")
     return folder
+
+
+@pytest.mark.parametrize(("beyond", "left"), [(0.0, False), (2.9, False), (3.1, True)])
+@pytest.mark.parametrize("low", [True, False])
+def test_no_range_is_left_by_less_than_its_sensor_scatters(beyond, left, low):
+    predicted = (-1.0 - 0.01 * beyond, 1.0) if low else (-1.0, 1.0 + 0.01 * beyond)
+    assert Use("angle", "rad", None, predicted, (-1.0, 1.0), 0.01).beyond_flown == left
+    assert Use("angle", "rad", None, predicted, (-1.0, 1.0)).beyond_flown == (beyond > 0.0)
+
+
+def test_a_log_that_is_whole_turns_on_widens_no_flown_range():
+    """An angle that goes round is the same two turns on: nothing was flown in between."""
+    states = [dataclasses.replace(state, periodic=state.name == "angle") for state in SIGNALS.states]
+    signals = dataclasses.replace(SIGNALS, states=states)
+    system = tl.systems.Simulated(signals, swinging, default_gains=PENDULUM_GAINS, noise=[0.005, 0.02])
+    campaign = tl.Campaign(
+        signals, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        options={**SMALL, "draws": 8},
+    )  # fmt: skip
+    campaign.run(system, experiments=2)
+    before, looked = campaign.certificate().uses[0], campaign.examine()
+    first = campaign.experiments[0].trajectory
+    on = np.array([4.0 * np.pi, 0.0])
+    campaign.attach(tl.Trajectory(first.t, first.states + on, first.commands))
+    campaign.interrupted = True  # what was learnt is enough
+    after, found = campaign.certificate().uses[0], campaign.examine()
+    assert after.flown == pytest.approx(before.flown, abs=1e-9) and after.name == "angle"
+    assert ranges(found).rows == ranges(looked).rows
+    assert found.beyond == looked.beyond
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
+from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.examination.reaching import NOISE
 from twinloop.campaign.history import Experiment
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.law.linear.margins import Margins
@@ -27,7 +31,8 @@ class Use:
         unit: of it.
         envelope: between which it is safe; None: nothing is declared.
         predicted: least and largest value of the predicted band.
-        flown: least and largest reading of all flights.
+        flown: least and largest reading of all flights, an angle continued through whole turns from the task's start.
+        noise: standard deviation of its sensor; 0 where it is not known.
     """
 
     name: str
@@ -35,11 +40,13 @@ class Use:
     envelope: tuple[float, float] | None
     predicted: tuple[float, float]
     flown: tuple[float, float]
+    noise: float = 0.0
 
     @property
     def beyond_flown(self) -> bool:
-        """Whether it leaves the flown range."""
-        return self.predicted[0] < self.flown[0] or self.predicted[1] > self.flown[1]
+        """Whether it leaves the flown range by more than the sensor scatters."""
+        room = NOISE * self.noise
+        return self.predicted[0] < self.flown[0] - room or self.predicted[1] > self.flown[1] + room
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +105,7 @@ def certificate(campaign: Campaign) -> Certificate:
     found = campaign.examine()
     best, twin = found.best, found.twin
     step = found.planned
-    uses = () if step is None else _uses(found.experiments, step)
+    uses = () if step is None else _uses(found, step)
     # Around a twin that does not follow its own flights margins say nothing of the system's.
     margins = found.margins if twin.follows else None
     why_none = found.no_margins if twin.follows else "The twin does not follow its flights."
@@ -116,12 +123,12 @@ def certificate(campaign: Campaign) -> Certificate:
     )
 
 
-def _uses(experiments: tuple[Experiment, ...], step: Trajectory) -> tuple[Use, ...]:
-    signals = experiments[0].replayed.signals
+def _uses(found: Examination, step: Trajectory) -> tuple[Use, ...]:
     low, high = (step.states, step.states) if step.band is None else step.band
+    sensors = np.zeros(found.signals.n_x) if found.twin.noise is None else found.twin.noise.sensors
     uses = []
-    for i, state in enumerate(signals.states):
-        flown = [run.trajectory.states[:, i] for run in experiments]
+    for i, state in enumerate(found.signals.states):
+        flown = [run.states[:, i] for run in found.flown]
         uses.append(
             Use(
                 name=state.name,
@@ -129,6 +136,7 @@ def _uses(experiments: tuple[Experiment, ...], step: Trajectory) -> tuple[Use, .
                 envelope=state.envelope,
                 predicted=(float(low[:, i].min()), float(high[:, i].max())),
                 flown=(min(float(x.min()) for x in flown), max(float(x.max()) for x in flown)),
+                noise=float(sensors[i]),
             )
         )
     return tuple(uses)

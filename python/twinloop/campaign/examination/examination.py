@@ -119,6 +119,12 @@ class Examination:
         except NotAvailable as reason:
             self.no_controller = str(reason)
 
+    @cached_property
+    def flown(self) -> tuple[Trajectory, ...]:
+        """What was flown, one run an experiment, with angles that are continued from the task's start."""
+        start = self.setup.initial_state
+        return tuple(continued(run.trajectory, self.signals, start) for run in self.experiments)
+
     @property
     def distance(self) -> float:
         """From the task's start to its target, in the states' units."""
@@ -326,7 +332,7 @@ class Examination:
         frequencies = np.geomspace(2e-3 * np.pi / dt, np.pi / dt * (1.0 - 1e-9), 200)
         found = [loop.plant.response(frequencies)[:, : self.signals.n_x] @ loop.of_axes for loop in loops]
         inputs = [self._of_axes(run.trajectory.commands) for run in self.experiments]
-        outputs = [run.trajectory.states[:-1] for run in self.experiments]
+        outputs = [run.states[:-1] for run in self.flown]
         flown = frequency_responses(
             inputs, outputs, dt, None if self.twin.noise is None else self.twin.noise.sensors
         )
@@ -451,7 +457,5 @@ class Examination:
         """Share of the planned flight beyond the range of states and commands that was flown."""
         if self.planned is None or self.planned.steps == 0:
             return None
-        flown = np.concatenate(
-            [np.hstack([r.trajectory.states[:-1], r.trajectory.commands]) for r in self.experiments]
-        )
+        flown = np.concatenate([np.hstack([run.states[:-1], run.commands]) for run in self.flown])
         return outside_of(flown, np.hstack([self.planned.states[:-1], self.planned.commands]))

@@ -19,8 +19,8 @@ MOST = 12
 def coverage(found: Examination) -> Figure | None:
     """State against command where it was flown, and the prediction for the controller to fly if there is one."""
     planned = found.planned
-    states = np.concatenate([run.trajectory.states[:-1] for run in found.experiments])
-    commands = np.concatenate([run.trajectory.commands for run in found.experiments])
+    states = np.concatenate([run.states[:-1] for run in found.flown])
+    commands = np.concatenate([run.commands for run in found.flown])
     shown = np.unique(np.linspace(0, len(states) - 1, DOTS).astype(int))
     panels = []
     signals = found.signals

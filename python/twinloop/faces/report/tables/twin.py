@@ -179,7 +179,7 @@ def _poles(name: str, title: str, found: Sequence[Pole], note: str) -> Table | N
 
 def ranges(found: Examination) -> Table:
     """What was flown: where the twin's word holds."""
-    runs = [run.trajectory for run in found.experiments]
+    runs = found.flown
     rows: list[list[object]] = []
     of_states = [(state.name, *shown_unit(state.unit)) for state in found.signals.states]
     # Commands keep their units, as in the figures: a rotor's speed is no angle.
