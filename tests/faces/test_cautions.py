@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import pytest
 import twinloop as tl
 from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS
 from lives import SMALL
-from twinloop.faces.cautions import leaving
+from twinloop.campaign.assessment import Advice
+from twinloop.faces.cautions import advised_to_stop, leaving
 from twinloop.faces.sheet import facts, sheet
 from twinloop.remarks import serious
 
@@ -67,6 +69,29 @@ def test_a_twin_that_is_not_reliable_is_said_with_the_first_reason(campaign):
     test = campaign.test(PENDULUM_GAINS)
     found = facts(test, Path("rig-test-0.csv"), True, predicted(high=2.0), against)
     assert found["serious"] == ["free-run", "unmoved"] and found["band_leaves"] == {"angle": [0.0, 1.0]}
+
+
+def test_where_the_advice_is_to_stop_a_sheet_says_so_first(campaign):
+    test = campaign.test(PENDULUM_GAINS)
+    advice = Advice(1, True, 1e-5, 1e-3, 1e-3, True)
+
+    def advised(measured=0.4, **changes):
+        best = replace(test.quiet(), measured=measured)
+        return advised_to_stop(
+            SimpleNamespace(history=[0], advice=replace(advice, **changes), best_test=best)
+        )
+
+    to_stop = "The advice is to stop: for the controller another flight would bring less than the scatter of"
+    assert advised().startswith(to_stop)
+    text = sheet("rig.db", test, None, "rig-test-0.csv", campaign.setup, advice=advised())
+    assert text.splitlines()[1] == advised()
+    assert facts(test, Path("rig-test-0.csv"), True, None, (), advised())["advice"] == advised()
+    # Before the controller to fly has flown there is a flight to be made.
+    assert advised(measured=None) == advised(stop=False) == advised(stop=None) == ""
+    assert facts(test, Path("rig-test-0.csv"), True, None, ())["advice"] is None
+    assert "advice" not in said(campaign, None)
+    for nothing in (SimpleNamespace(history=[]), SimpleNamespace(history=[0], advice=None)):
+        assert advised_to_stop(nothing) == ""
 
 
 def test_a_sheet_says_what_is_scaled_and_what_a_program_does_that_cannot(campaign):

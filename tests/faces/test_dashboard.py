@@ -1,6 +1,7 @@
 """The dashboard as people and strangers meet it: over HTTP, and in a browser."""
 
 import contextlib
+import dataclasses
 import json
 import shutil
 import signal
@@ -22,6 +23,7 @@ from lives import PLANT, stored
 pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
 pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
 
+from twinloop.campaign.assessment import Advice
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.faces.dashboard import app, desk
 from twinloop.faces.dashboard.command import prepared
@@ -60,6 +62,22 @@ def test_a_test_is_approved_told_and_the_next_one_planned(store, tmp_path):
     np.testing.assert_array_equal(
         campaign.experiments[1].trajectory.states, PLANT.run(campaign.tests[1]).states
     )
+
+
+def test_a_card_and_its_sheet_say_that_the_advice_is_to_stop(store, monkeypatch):
+    def shown():
+        with served(store) as address:
+            (card,) = json.loads(call(address, "GET", "/c/1/tests")[2])["tests"]
+            return card["advice"], call(address, "GET", "/c/1/tests/1/sheet")[2]
+
+    monkeypatch.setattr(tl.Campaign, "advice", Advice(1, True, 1e-2, 1e-3, 1e-3, False))
+    card, sheet = shown()
+    assert card == "" and "The advice" not in sheet
+    monkeypatch.setattr(tl.Campaign, "advice", Advice(1, True, 1e-5, 1e-3, 1e-3, True))
+    best = dataclasses.replace(look(store).best_test, measured=0.1)
+    monkeypatch.setattr(tl.Campaign, "best_test", best)
+    card, sheet = shown()
+    assert card.startswith("The advice is to stop: ") and f"\n{card}\n" in sheet
 
 
 def test_what_went_wrong_is_told(store, tmp_path):

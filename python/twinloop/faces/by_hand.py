@@ -15,7 +15,7 @@ from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
-from twinloop.faces.cautions import serious_of
+from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
@@ -100,10 +100,11 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
+    advice = advised_to_stop(campaign)
     text = sheet(
-        shown_name(store), test, predicted, str(file), campaign.setup, against_twin, campaign.waiting
+        shown_name(store), test, predicted, str(file), campaign.setup, against_twin, campaign.waiting, advice
     )
-    return text, facts(test, file, bool(campaign.experiments), predicted, against_twin)
+    return text, facts(test, file, bool(campaign.experiments), predicted, against_twin, advice)
 
 
 @click.command()

@@ -1,4 +1,4 @@
-"""Cautions on a test sheet: a band that leaves the envelope, and a twin that is not reliable."""
+"""Cautions on a test sheet: advice to stop, a band that leaves the envelope, a twin that is not reliable."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop._ground.texts import to_type
+from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import controller_to_fly
 from twinloop.campaign.history import Lesson
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -52,6 +54,24 @@ def _when(first: float, last: float, end: float) -> str:
     if last >= end:
         return f"from {first:.4g} s on"
     return f"at {first:.4g} s" if first == last else f"between {first:.4g} and {last:.4g} s"
+
+
+def advised_to_stop(campaign: Campaign) -> str:
+    """That a further test is one more than the controller needs; empty where it is not.
+
+    Args:
+        campaign: that has planned it.
+    """
+    advice = campaign.advice if campaign.history else None
+    if advice is None or not advice.stop:
+        return ""
+    best, _ = controller_to_fly(campaign)
+    if best is None or best.measured is None:
+        return ""  # there is a flight to be made
+    return (
+        "The advice is to stop: for the controller another flight would bring less than the scatter of one"
+        " measurement."
+    )
 
 
 def serious_of(lesson: Lesson | None) -> list[Remark]:

@@ -130,7 +130,12 @@ def _listed(names: list[str]) -> str:
 
 
 def facts(
-    test: Test, file: Path, flown: bool, predicted: Trajectory | None, against: Sequence[Remark]
+    test: Test,
+    file: Path,
+    flown: bool,
+    predicted: Trajectory | None,
+    against: Sequence[Remark],
+    advice: str = "",
 ) -> dict[str, object]:
     """The sheet as values.
 
@@ -140,6 +145,7 @@ def facts(
         flown: whether there is any run yet.
         predicted: its run on the twin; None where nothing is known yet.
         against: what speaks against the twin.
+        advice: to stop instead; empty where there is none.
     """
     signals = test.family.signals
     return {
@@ -157,6 +163,7 @@ def facts(
         "risk_unknown": unknown_risk(test) if test.risk is None else None,
         "band_leaves": {name: list(times) for name, times in leaving(signals, predicted).items()},
         "serious": list(dict.fromkeys(remark.code for remark in against)),
+        "advice": advice or None,
         "why": reason(test, flown),
         "file": str(file),
     }
@@ -209,6 +216,7 @@ def sheet(
     setup: Setup,
     against: Sequence[Remark] = (),
     waiting: Sequence[Test] = (),
+    advice: str = "",
 ) -> str:
     """The test sheet, to be printed.
 
@@ -220,6 +228,7 @@ def sheet(
         setup: of the campaign.
         against: what speaks against the twin.
         waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
+        advice: to stop instead; empty where there is none.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
@@ -228,6 +237,7 @@ def sheet(
     added = "none" if test.excitation is None else f"a row a period in {file}, added before the bounds"
     lines = [
         f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
+        *([advice] if advice else []),
         "",
         table(["set this gain", "to", "unit"], gains),
         "",

@@ -21,7 +21,7 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
-from twinloop.faces.cautions import serious_of
+from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.dashboard.desk import Desk, unlearnt
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.report.page import source_page, style, templates
@@ -219,6 +219,7 @@ class Pages:
                     if test.risk is None
                     else risk_words(test.risk, campaign.setup.predicted_flights, bounded),
                     "risk_of": risk_of_what(bounded),
+                    "advice": advised_to_stop(campaign),
                     "reason": test.reason,
                     "approved": may.get(test.number) if test.number is not None else None,
                 }
@@ -248,7 +249,8 @@ class Pages:
         predicted = foreseen(campaign, test) if campaign.history else None
         against = serious_of(latest_lesson(campaign))
         waiting, file = to_be_flown(campaign), f"test-{number}.csv"
-        return sheet(self.desk.title, test, predicted, file, campaign.setup, against, waiting)
+        advice = advised_to_stop(campaign)
+        return sheet(self.desk.title, test, predicted, file, campaign.setup, against, waiting, advice)
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)

@@ -48,6 +48,8 @@
     const part = get("test").content.cloneNode(true), one = (name) => part.querySelector(name);
     const path = "/tests/" + test.number;
     one("h3").textContent = "Test " + test.number;
+    one(".advice").hidden = !test.advice;
+    one(".advice").textContent = test.advice;
     one(".reason").textContent = test.reason || "";
     const rows = Object.entries(test.gains);
     if (test.predicted !== null) rows.push(["quality predicted", (test.predicted + (test.spread === null ? "" : " ± " + test.spread) + " " + test.unit).trim()]);
