@@ -96,6 +96,26 @@ class Frequency:
     place: tuple[int, int]
 
 
+@dataclass(frozen=True, eq=False)
+class _FoundLoops:
+    """Loops of the controller to fly around the twin, then around each member of its committee.
+
+    Args:
+        sticking: as dry friction sticks, or without any.
+        sliding: as it slides; empty without any.
+        names: of the places where they are broken.
+    """
+
+    sticking: Sequence[Loops]
+    sliding: Sequence[Loops]
+    names: Sequence[str]
+
+    @property
+    def all(self) -> Sequence[Loops]:
+        """What is drawn: sliding, as in flights, then sticking."""
+        return [*self.sliding, *self.sticking]
+
+
 class Examination:
     """The numbers that an engineer checks, each computed on first access.
 
@@ -252,24 +272,19 @@ class Examination:
         return None
 
     @cached_property
-    def _found_loops(self) -> tuple[list[Loops], Sequence[str]] | str:
-        """The loops with their names, dry friction sticking, or why there are none."""
+    def _found_loops(self) -> _FoundLoops | str:
+        """The loops, or why there are none."""
         if self.best is None:
             return self.no_controller
         try:
-            return loops_around(self.twin, self.setup, self.best.genes, "axes")
+            sticking, names = loops_around(self.twin, self.setup, self.best.genes, "axes")
+            sliding, _ = loops_around(self.twin, self.setup, self.best.genes, "axes", slides=True)
         except NotAvailable as reason:
             return str(reason)
-
-    @cached_property
-    def _sliding(self) -> list[Loops]:
-        """The same loops as dry friction slides; empty without any."""
-        if self.best is None or self._loops is None:
-            return []
-        return loops_around(self.twin, self.setup, self.best.genes, "axes", slides=True)[0]
+        return _FoundLoops(sticking, sliding, names)
 
     @property
-    def _loops(self) -> tuple[list[Loops], Sequence[str]] | None:
+    def _loops(self) -> _FoundLoops | None:
         return None if isinstance(self._found_loops, str) else self._found_loops
 
     @property
@@ -280,7 +295,8 @@ class Examination:
     @cached_property
     def margins(self) -> Margins | None:
         """Of the controller to fly, at the target; None if it or the twin cannot be linearised there."""
-        return None if self._loops is None else margins_of(*self._loops, "axes", self._sliding)
+        found = self._loops
+        return None if found is None else margins_of(found.sticking, found.names, "axes", found.sliding)
 
     @cached_property
     def delay_borne(self) -> int:
@@ -292,10 +308,7 @@ class Examination:
     @cached_property
     def loops(self) -> tuple[LoopCurves, ...]:
         """Each loop over frequency, with dry friction also of each model as it slides; empty without margins."""
-        if self._loops is None:
-            return ()
-        loops, names = self._loops
-        return loop_curves([*self._sliding, *loops], names)
+        return () if self._loops is None else loop_curves(self._loops.all, self._loops.names)
 
     @cached_property
     def closed(self) -> ClosedCurves | None:
@@ -303,21 +316,19 @@ class Examination:
 
         With dry friction as it slides: what moves a state at all has overcome it.
         """
-        if self._loops is None:
-            return None
-        return closed_curves([*self._sliding, *self._loops[0]][0], self.setup, self.twin.noise)
+        return None if self._loops is None else closed_curves(self._loops.all[0], self.setup, self.twin.noise)
 
     @cached_property
     def closed_poles(self) -> tuple[Pole, ...]:
         """Poles of the twin's closed loops, as dry friction sticks."""
-        return () if self._loops is None else poles(self._loops[0][0].closed_poles(), self.signals.dt)
+        return () if self._loops is None else poles(self._loops.sticking[0].closed_poles(), self.signals.dt)
 
     @cached_property
     def sliding_closed_poles(self) -> tuple[Pole, ...]:
         """The same as dry friction slides; empty without any."""
-        if not self.has_friction or not self._sliding:
+        if not self.has_friction or self._loops is None:
             return ()
-        return poles(self._sliding[0].closed_poles(), self.signals.dt)
+        return poles(self._loops.sliding[0].closed_poles(), self.signals.dt)
 
     @cached_property
     def responses(self) -> tuple[Frequency, ...]:
@@ -327,8 +338,7 @@ class Examination:
         """
         if self._loops is None:
             return ()
-        names, dt = self._loops[1], self.signals.dt
-        loops = [*self._sliding, *self._loops[0]]
+        loops, names, dt = self._loops.all, self._loops.names, self.signals.dt
         frequencies = np.geomspace(2e-3 * np.pi / dt, np.pi / dt * (1.0 - 1e-9), 200)
         found = [loop.plant.response(frequencies)[:, : self.signals.n_x] @ loop.of_axes for loop in loops]
         inputs = [self._of_axes(run.trajectory.commands) for run in self.experiments]
