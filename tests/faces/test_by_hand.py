@@ -449,6 +449,20 @@ def test_another_duration_is_named_as_the_file_does(folder):
     assert "found another: signals: dt: 0.05 in the store, 0.1 now;" in run("ask", "rig.db").stderr
 
 
+def test_of_equal_periods_other_steps_are_another_campaign_however_short_they_are(tmp_path):
+    def campaign(steps):
+        return tl.Campaign(
+            tl.Signals([tl.State("x", "m", 1.0)], [tl.Command("u", "N", (-1.0, 1.0))], 1e-10), duration=steps * 1e-10,
+            controller=tl.controllers.StateFeedback(None, (-1.0, 1.0)), initial_state=[0.5], target_state=[0.0],
+            store=tmp_path / "quick.db", threads=1, progress=None,
+        )  # fmt: skip
+
+    campaign(100).close()
+    campaign(100).close()
+    with pytest.raises(tl.InvalidInput, match=r"duration: 1e-08 in the store, 1\.04e-08 now"):
+        campaign(104)
+
+
 def test_what_differs_between_a_store_and_its_file_is_named_where_long_lists_begin_alike(folder):
     run("ask", "rig.db")
     file = folder / "rig.toml"

@@ -243,6 +243,9 @@ def check_setup(known: Setup, asked: Setup, what: str) -> None:
 
 
 def _stated(setup: Record) -> Record:
-    """A setup with the length of a test as people state it, in s."""
+    """A setup with the length of a test as people state it, in s.
+
+    Its digits are counted from the first: of the same period, other steps are another length, however short it is.
+    """
     others = {key: value for key, value in setup.items() if key != "steps"}
-    return {**others, "duration": round(setup["steps"] * setup["signals"]["dt"], 9)}
+    return {**others, "duration": float(f"{setup['steps'] * setup['signals']['dt']:.12g}")}

@@ -22,7 +22,10 @@ WHAT = ("twin", "controller")
 @click.argument("what", default="twin")
 @click.option("--to", "kind", help=f"Kind: {', '.join(SUFFIXES)}; for a controller python or c.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="File to write; without it, standard output."
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="File to write, its kind by the suffix; without it, the text of --to on standard output.",
 )
 @click.option("--name", help="Name of the campaign, if the store holds several.")
 @click.option("--precision", default="double", show_default=True, help=f"For C: {' or '.join(PRECISIONS)}.")
