@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import same_bits
 from twinloop.trajectory import Trajectory, completed, recorded_as
-from twinloop.unmeasured import Differences, completed_state, in_words, lacks, logged
+from twinloop.unmeasured import Differences, completed_readings, completed_state, in_words, lacks, logged
 
 COMMAND = tl.Command("torque", "N m", (-1.0, 1.0))
 
@@ -133,6 +133,10 @@ def test_a_record_with_all_columns_and_what_is_no_record_stay():
 def test_a_record_of_one_row_is_at_rest():
     one = Trajectory(np.zeros(1), np.ones((1, 2)), np.zeros((0, 1)))
     assert completed(one, signals()).states.tolist() == [[1.0, 1.0, 0.0, 0.0]]
+
+
+def test_readings_without_a_row_have_none():
+    assert completed_readings(np.zeros((0, 2)), signals()).shape == (0, 4)
 
 
 def test_what_is_not_measured_is_at_rest_in_a_state():

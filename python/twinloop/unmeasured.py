@@ -63,6 +63,8 @@ def completed_readings(readings: Floats, signals: Signals, start: Floats | None 
         where it is so far off that the run began in motion.
     """
     states = _among(readings, signals)
+    if not len(states):
+        return states
     for i, of in sources(signals):
         changes = _change(states[1:, of], states[:-1, of], of, signals)
         states[1:, i] = changes

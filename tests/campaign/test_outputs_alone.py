@@ -140,6 +140,8 @@ def test_predictions_of_flights_come_true():
     assert not [remark for remark in campaign.twin.remarks if remark.serious]
     found = campaign.examine()
     assert found.autocorrelation.told.tolist() == [True, False]
+    # No sensor reads the rate, so nothing is said of how far it moved beside a sensor's noise.
+    assert found.movement[0] == "angle" and {flight.least for flight in found.data} == {"angle"}
     for figure in (autocorrelation(found), crosscorrelation(found)):
         assert [panel.title for panel in figure.panels] == ["angle"]
 

@@ -226,7 +226,6 @@ class Examination:
     @cached_property
     def data(self) -> tuple[DataQuality, ...]:
         """Data quality of each flight."""
-        sensors = None if self.twin.noise is None else self.twin.noise.sensors
         found = []
         for place, run in enumerate(self.experiments):
             own = (
@@ -235,15 +234,14 @@ class Examination:
                 else self.innovations[place]
             )
             saturated = max((each.saturated for each in effort(run.trajectory, self.signals)), default=0.0)
-            found.append(data_quality(run, sensors, own, saturated))
+            found.append(data_quality(run, self._sensors, own, saturated))
         return tuple(found)
 
     @cached_property
     def movement(self) -> tuple[str, float] | None:
-        """The state that moved least, and its largest motion in a flight, in sensor noises; None: unknown noise."""
-        sensors = None if self.twin.noise is None else self.twin.noise.sensors
+        """The measured state that moved least, its largest motion in a flight in sensor noises; None: unknown noise."""
         found = [
-            movements(continued(flown, self.signals, flown.states[0]).states, sensors)
+            movements(continued(flown, self.signals, flown.states[0]).states, self._sensors)
             for flown in (run.trajectory for run in self.experiments)
         ]
         known = [each for each in found if each is not None]
@@ -252,6 +250,15 @@ class Examination:
         most = np.max(known, axis=0)
         place = int(np.argmin(most))
         return self.signals.state_names[place], float(most[place])
+
+    @property
+    def _sensors(self) -> Floats | None:
+        """Standard deviation of each state's sensor (n_x,), 0 of a state that has none; None: unknown."""
+        if self.twin.noise is None:
+            return None
+        sensors = self.twin.noise.sensors.copy()
+        sensors[list(self.signals.unmeasured)] = 0.0
+        return sensors
 
     # The controller
 

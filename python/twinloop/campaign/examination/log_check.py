@@ -58,7 +58,8 @@ class Column:
         least: its smallest number; None if it has no number.
         greatest: its largest number.
         missing: rows without a finite number.
-        moved: of a state, root mean square about its mean over an upper bound of its noise; None: unknown.
+        moved: of a state, root mean square about its mean over an upper bound of its noise; None: unknown, or no sensor
+            reads it.
         at_bound: of a command, share of the rows at a bound.
         beyond: share of the rows beyond its bounds or its envelope.
     """
@@ -128,15 +129,18 @@ def _checked(
     compared: bool,
 ) -> LogCheck:
     """A log as it was checked; with columns compared with each other, which takes most of the time and gives notes."""
+    of_others: Set[str] = frozenset()
     if lacks(states, signals):
         states = completed_readings(states, signals)
+        of_others = {signals.state_names[i] for i in signals.unmeasured}
     steps = np.diff(t)
     known = steps[np.isfinite(steps)]
     lost = known > LOST * signals.dt
     near = known[~lost]
     remarks = [*_of_times(t, known, signals.dt, lines)]
     columns = (*_states(states, signals), *_commands(commands, signals))
-    remarks += [remark for column in columns for remark in _of_column(column, len(t))]
+    for column in columns:
+        remarks += _of_envelope(column) if column.name in of_others else _of_column(column, len(t))
     remarks += _of_scales(states, signals)
     if (
         np.isfinite(t).all()
@@ -259,7 +263,10 @@ def _states(states: Floats, signals: Signals) -> Iterator[Column]:
     if len(states) > 3 and np.isfinite(states).all():
         run = Run.of(states, np.zeros((len(states) - 1, signals.n_u))).continued(signals)
         noise = np.sqrt(guessed_noise([run], np.array([state.scale for state in signals.states])))
-        moved = (run.states.std(axis=0) / noise).tolist()
+        shares = (run.states.std(axis=0) / noise).tolist()
+        moved = [
+            share if state.measured else None for share, state in zip(shares, signals.states, strict=True)
+        ]
     for i, state in enumerate(signals.states):
         kept, missing = _finite(states[:, i])
         beyond = None
@@ -322,8 +329,13 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
             f"{name} moved only {two_digits(column.moved)} times its noise: below {MOVED:g} little can be learnt about"
             " it; excite it more.",
         )
+    yield from _of_envelope(column)
+
+
+def _of_envelope(column: Column) -> Iterator[Remark]:
+    """That a state was outside its envelope: of one that is computed from others' readings, all that is said of it."""
     if column.beyond:
-        said = f"{name} was outside its envelope in {100.0 * column.beyond:.3g} % of the rows"
+        said = f"{column.name} was outside its envelope in {100.0 * column.beyond:.3g} % of the rows"
         if column.beyond <= OUTSIDE:
             yield note("envelope", f"{said}.")
         else:
