@@ -72,7 +72,7 @@ FAULTS = {
     "gaps": (without([30, 31, 32, 70]), "in 2 places, about 4 in all, the first after 1.45 s (line 31)"),
     "jitter": (changed("t", lambda t: t + 0.002 * (np.arange(len(t)) % 2)), "up to 4 %"),
     "order": (changed("t", 1.0, 50), "line 52"),
-    "not-a-number": (changed("rate", np.nan, 40), "rate has no finite number in 1 of 121 rows"),
+    "not-a-number": (changed("rate", np.nan, [40, 41]), "rate has no finite number in 2 of 121 rows"),
     "still": (changed("rate", 0.25), "0.25 rad/s in every row"),
     "frozen": (changed("angle", lambda x: x[0], slice(60, 90)), "froze"),
     "derivative": (changed("rate", lambda x: -x), "declared derivative"),
@@ -141,7 +141,7 @@ ROWS = {
     "a row that was lost": (without([51]), 50),
     "a reading out of scale": (changed("angle", 1e9, 50), 50),
     "a command beyond its bounds": (changed("torque", 50.0, 50), 50),
-    "no number": (changed("rate", np.nan, 50), 50),
+    "no number": (changed("rate", np.nan, [50, 51]), 50),
 }
 
 
@@ -215,8 +215,35 @@ def test_empty_cells_of_a_historian_are_counted_and_a_slow_period_is_told_in_sec
     (tmp_path / "oven.toml").write_text(
         'dt = 10.0\n[states.heat]\nunit = "K"\nscale = 10.0\n[commands.power]\nunit = "W"\nbounds = [0.0, 9.0]\n'
     )
-    rows = [f"{10 * k};{'' if k in (5, 9) else np.sin(k / 5)};{k % 9}" for k in range(60)]
-    (tmp_path / "oven.csv").write_text("\n".join(["t;heat;power", *rows]))
-    said = invoke("check", str(tmp_path / "oven.csv"), str(tmp_path / "oven.toml"))
+
+    def checked(empty):
+        rows = [f"{10 * k};{'' if k in empty else np.sin(k / 5)};{k % 9}" for k in range(60)]
+        (tmp_path / "oven.csv").write_text("\n".join(["t;heat;power", *rows]))
+        return invoke("check", str(tmp_path / "oven.csv"), str(tmp_path / "oven.toml"))
+
+    said = checked((5, 6))
     assert "60 rows over 590 s, one in 10 s." in said.stdout
     assert said.exit_code == 1 and "heat has no finite number in 2 of 60 rows: fill in" in said.stdout
+    # Single ones are filled in, and that is said.
+    said = checked((5, 9))
+    assert said.exit_code == 0 and "lacks single readings, 2 of heat: each is taken half-way" in said.stdout
+
+
+def test_of_a_rate_that_no_sensor_reads_nothing_is_said_that_its_state_explains(tmp_path):
+    (tmp_path / "rig.toml").write_text(
+        'dt = 0.1\nlags = 1\n[states.x]\nunit = "m"\nscale = 1.0\n[commands.u]\nunit = "N"\nbounds = [-1.0, 1.0]\n'
+    )
+
+    def checked(rows):
+        (tmp_path / "log.csv").write_text("\n".join(["t,x,u", *rows]) + "\n")
+        return invoke("check", str(tmp_path / "log.csv"), str(tmp_path / "rig.toml"))
+
+    said = checked([])
+    assert said.exit_code == 1 and "The log has 0 rows" in said.stdout and said.stdout.count("✗") == 2
+    x = np.where(np.isin(np.arange(60), (20, 21)), np.nan, np.sin(np.arange(60) / 5))
+    said = checked([f"{0.1 * k:.1f},{'' if np.isnan(x[k]) else x[k]},{k % 3 - 1}" for k in range(60)])
+    assert "x has no finite number in 2 of 60 rows" in said.stdout and "x_rate has" not in said.stdout
+    # A rate that is mostly noise is no sensor that moved too little.
+    noisy = np.linspace(0.0, 0.05, 60) + 0.003 * np.random.default_rng(0).standard_normal(60)
+    said = checked([f"{0.1 * k:.1f},{noisy[k]},{k % 3 - 1}" for k in range(60)])
+    assert said.exit_code == 0 and "little" not in said.stdout

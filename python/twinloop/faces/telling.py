@@ -183,7 +183,8 @@ def against_it(campaign: Campaign, flight: Experiment, test: Test | None, read: 
         read: its log.
     """
     found = against(flight, test, campaign.signals, read.lines)
-    return [*(remark.sentence for remark in found), *_told_twice(campaign, flight, test)]
+    said = [remark.sentence for remark in (*read.remarks, *found)]
+    return [*said, *_told_twice(campaign, flight, test)]
 
 
 def _told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> list[str]:

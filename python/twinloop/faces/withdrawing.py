@@ -15,7 +15,7 @@ from twinloop.campaign.history import Experiment, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.telling import counted
-from twinloop.logs import load
+from twinloop.logs import read_log
 from twinloop.store import shown_name
 from twinloop.trajectory import recorded_as
 
@@ -77,7 +77,7 @@ def chosen(campaign: Campaign, which: str) -> int | Experiment:
     if place is not None and (found := attached.get(_attached_name(int(place[1])))):
         return found
     if place is None and Path(which).is_file():
-        run = load(Path(which), campaign.signals)
+        run = read_log(Path(which), campaign.signals).trajectory()
         equal = [each for each in campaign.experiments if recorded_as(run, each.trajectory, campaign.signals)]
         if equal:
             return equal[-1]

@@ -17,11 +17,12 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.writing import write_whole
 from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
 from twinloop.logs.headers import advice, listed
+from twinloop.logs.missing import filled
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
-from twinloop.unmeasured import logged, names_of
+from twinloop.unmeasured import columns_of, logged, names_of
 
 TIME = "t"
 """Name of the column of times, s."""
@@ -34,6 +35,8 @@ MOST_BYTES = 200_000_000
 @dataclass(frozen=True, eq=False)
 class Log:
     """The columns of a log as they stand there, whatever is wrong with them; of a `.ulg` on the period of the signals.
+
+    Only single readings that are missing are filled in, which a remark says.
 
     Args:
         called: what messages call it.
@@ -90,6 +93,8 @@ def load(
     columns are ignored, states that are not measured may be missing, and the commands of the last row may be empty. If
     the file ends within a row, at a number that may be a part of one, it is refused. A file of NumPy (`.npz`) has
     arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), whose last row is ignored.
+    Single readings may be missing (an empty cell, or NaN), up to a twentieth of a state's: each is taken half-way
+    between those before and after, and a `RemarkWarning` says how many.
 
     A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with its own times. They are resampled to the
     period of the signals: states are interpolated between two samples, and each command is the last one sent. If two
@@ -129,7 +134,7 @@ def read_log(
     columns: Mapping[str, str] | None = None,
     window: Window = WHOLE,
 ) -> Log:
-    """The columns of a log as they stand there.
+    """The columns of a log as they stand there, with single missing readings filled in.
 
     Args:
         path: of the file.
@@ -163,7 +168,18 @@ def read_log(
         raise InvalidInput(
             f"Log {called}: expected a file that can be read, found: {reason.strerror}; check its name."
         ) from reason
-    return Log(called, signals, t, states, commands[:-1] if len(commands) == len(t) else commands, lines)
+    states, remarks = _completed(states, signals)
+    return Log(
+        called, signals, t, states, commands[:-1] if len(commands) == len(t) else commands, lines, remarks
+    )
+
+
+def _completed(readings: Floats, signals: Signals) -> tuple[Floats, tuple[Remark, ...]]:
+    """Readings without gaps of a single one, as far as they have the shape of some; and what was filled in."""
+    if readings.ndim != 2 or readings.dtype.kind != "f" or readings.shape[1] != columns_of(readings, signals):
+        return readings, ()
+    names = names_of(readings, signals)
+    return filled(readings, [state for state in signals.states if state.name in names])
 
 
 def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
@@ -288,8 +304,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         _refuse_cut(*body[-1], names, (TIME, *states_read), called)
 
     def column(name: str, count: int) -> list[float]:
-        place = names.index(name)
-        return [_number(row, place, name, line, called) for line, row in body[:count]]
+        place, empty = names.index(name), name in states_read
+        return [_number(row, place, name, line, called, empty) for line, row in body[:count]]
 
     def matrix(wanted: Sequence[str], count: int) -> Floats:
         return np.array([column(name, count) for name in wanted]).reshape(len(wanted), -1).T
@@ -330,8 +346,17 @@ def _refuse_cut(
         )
 
 
-def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -> float:
-    """The number of a cell; NaN where it is empty, as a historian leaves a reading that it does not have."""
+def _number(row: Sequence[str], place: int, name: str, line: int, called: str, empty: bool) -> float:
+    """The number of a cell; NaN where it is empty, as a historian leaves a reading that it does not have.
+
+    Args:
+        row: its cells.
+        place: of the cell.
+        name: of its column.
+        line: of the row.
+        called: what messages call the log.
+        empty: whether a single cell may be empty.
+    """
     if place >= len(row):
         raise InvalidInput(
             f"Log {called}, line {line}: expected a number for {name}, found a row of {len(row)}"
@@ -342,7 +367,8 @@ def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -
         return _read(text) if text else np.nan
     except ValueError as reason:
         raise InvalidInput(
-            f"Log {called}, line {line}: expected a number for {name}, found {text!r}; {_advice(text, name)}."
+            f"Log {called}, line {line}: expected a number for {name}, found {text!r};"
+            f" {_advice(text, name, empty)}."
         ) from reason
 
 
@@ -353,11 +379,11 @@ def _read(text: str) -> float:
     return float(text)
 
 
-def _advice(text: str, name: str) -> str:
+def _advice(text: str, name: str, empty: bool) -> str:
     """What to do about a cell that is no number."""
     whole, comma, rest = text.partition(",")
     if comma and whole.lstrip("+-").isdigit() and rest.isdigit():
         return "write decimals with a point"
     if name == TIME and any(mark in text for mark in ":-/"):
         return "write times in s from any start, such as that of the first row, not as dates"
-    return "correct it, or leave the cell empty where there is no reading"
+    return "correct it" + (", or leave the cell empty where a single reading is missing" if empty else "")
