@@ -75,6 +75,15 @@ def hidden(test: Test, run: Trajectory) -> bool:
     return off <= SEEN * SEEN or float(apart(sent, quiet, test).mean()) >= BETTER * off
 
 
+def hows(test: Test) -> list[Excited]:
+    """In which ways the excitation of a test may have been flown.
+
+    Args:
+        test: as it was asked for.
+    """
+    return [how for how in Excited if how is Excited.HELD_BACK or test.excitation is not None]
+
+
 def as_excited(test: Test, how: Excited) -> Test:
     """The same test with its excitation flown in another way.
 

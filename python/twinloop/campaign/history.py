@@ -31,7 +31,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     Args:
         replayed: what a twin flies for the comparison: the test, or the recorded commands, which are those of a test
-            that was flown with other gains too.
+            that was flown with other gains, or of another test, too.
         trajectory: the measured run.
         before: closed-loop error on this run of the twin at the last `ask`, over steps and states, each in units of its
             scale (the preset "paper": SI units squared); None if there was no `ask` yet.
@@ -53,12 +53,12 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def test(self) -> Test | None:
-        """The test; None for an attached run, and where other gains were flown than the test asks for."""
+        """The test; None for an attached run, and where other gains or another test were flown than it asks for."""
         return self.replayed if isinstance(self.replayed, Test) else None
 
     @property
     def number(self) -> int | None:
-        """Number of the test, with whatever gains it was flown; None for an attached run."""
+        """Number of the test that it was told as, whatever was flown; None for an attached run."""
         asked = self.replayed.asked if isinstance(self.replayed, FlownOtherwise) else self.test
         return None if asked is None else asked.number
 

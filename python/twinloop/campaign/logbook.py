@@ -281,7 +281,7 @@ class Logbook(Recorded, kind="logbook"):
         Args:
             run: of a test of this campaign, or an attached run.
         """
-        counting = as_it_counts(run, len(self.recorded), self.withdrawals, self.setup)
+        counting = as_it_counts(run, len(self.recorded), self)
         self.selected = with_run(self.selected, counting.replayed, counting.trajectory)
         self.recorded.append(run)
         self.experiments.append(counting)
@@ -351,9 +351,7 @@ class Logbook(Recorded, kind="logbook"):
         """What counts, of all that was entered."""
         runs, failures = ({getattr(each, key) for each in self.withdrawals} for key in ("run", "failure"))
         self.experiments = [
-            as_it_counts(run, place, self.withdrawals, self.setup)
-            for place, run in enumerate(self.recorded)
-            if place not in runs
+            as_it_counts(run, place, self) for place, run in enumerate(self.recorded) if place not in runs
         ]
         self.failures = [failure for place, failure in enumerate(self.reported) if place not in failures]
         self.selected = self.setup.none_selected()

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from twinloop._ground.texts import text
 from twinloop.campaign.data.gains import flown_otherwise
+from twinloop.campaign.data.rows import late_commands
 from twinloop.campaign.excited import as_excited, excited, hidden
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
-from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
 from twinloop.test import Test
 from twinloop.trajectory import equal_runs
@@ -54,22 +54,25 @@ def withdrawal_of(book: Logbook, which: object, reason: str, known: Sequence[int
     return Withdrawal(reason, test, run, failure, len(book.recorded), tuple(left), tuple(planned))
 
 
-def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal], setup: Setup) -> Experiment:
+def as_it_counts(run: Experiment, place: int, book: Logbook) -> Experiment:
     """A run as it was flown, without what was predicted of it by a twin that had learnt a withdrawn flight.
 
     Args:
         run: as it was recorded.
         place: among all that were.
-        withdrawals: of the campaign.
-        setup: of the campaign. The preset "paper" learns from tests of its controllers only, as they were asked for.
+        book: of the campaign. The preset "paper" learns from tests of its controllers only, as they were asked for.
     """
-    test = run.test
-    if test is not None and setup.preset != "paper":
-        otherwise = flown_otherwise(test, run.trajectory, setup.controller)
+    test, setup, withdrawals = run.test, book.setup, book.withdrawals
+    # In other rows than those of their readings commands tell neither gains nor an excitation.
+    late = test is not None and any(late_commands(test, run.trajectory))
+    if test is not None and not late and setup.preset != "paper":
+        # Tests that surely had been made when the run was told: what it counts for must not change with later ones.
+        made = max(told.number for told in [*book.recorded[:place], run] if told.number is not None)
+        otherwise = flown_otherwise(test, run.trajectory, setup.controller, book.tests[:made])
         if otherwise is not None:
             return replace(run, replayed=otherwise, before=None, final_distance=None, quality=None)
     if test is not None:
-        flown = as_excited(test, excited(test, run.trajectory))
+        flown = test if late else as_excited(test, excited(test, run.trajectory))
         as_asked = flown is test or hidden(test, run.trajectory)
         # Of what was not asked for nothing was predicted.
         if not as_asked or any(test.number in each.planned for each in withdrawals):

@@ -10,7 +10,7 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS
 from twinloop.campaign.data.readings import froze, ratio
 from twinloop.campaign.data.reports import derived, repeats
-from twinloop.campaign.data.sent import exchanged, other_commands
+from twinloop.campaign.data.sent import exchanged, exchanged_with_state, other_commands
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of, distinct
 from twinloop.campaign.identify_and_plan.elsewhere import Elsewhere
@@ -197,6 +197,28 @@ def test_two_commands_exchanged_among_four_are_found_and_named():
         names = [system.signals.commands[i].name for i in pair]
         (said_of_it,) = against(wrong, test, system.signals)
         assert said_of_it.sentence.endswith(f"They would be with {names[0]} and {names[1]} exchanged.")
+
+
+@pytest.mark.parametrize("state", ["angle", "rate"])
+def test_a_command_exchanged_with_a_state_is_found_and_both_are_named(new_campaign, pendulum, state):
+    test = new_campaign().test(PENDULUM_GAINS)
+    run = pendulum.run(test)
+    i = test.signals.state_names.index(state)
+    states, commands = run.states.copy(), run.commands.copy()
+    states[:-1, i], commands[:, 0] = run.commands[:, 0], run.states[:-1, i]
+
+    def flight(states, commands):
+        found = tl.Trajectory(run.t, states, commands)
+        return SimpleNamespace(test=test, replayed=test, number=0, trajectory=found, off_start=())
+
+    assert exchanged_with_state(flight(run.states, run.commands)) is None
+    assert exchanged_with_state(flight(run.states, -run.commands)) is None
+    wrong = flight(states, commands)
+    assert exchanged_with_state(wrong) == (state, "torque") and other_commands([wrong]) == [0]
+    (sentence,) = (
+        each.sentence for each in against(wrong, test, test.signals) if each.code == "other-commands"
+    )
+    assert sentence.endswith(f"They would be with {state} and torque exchanged.")
 
 
 def codes(*runs):

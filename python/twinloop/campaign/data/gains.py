@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.elementary import product
-from twinloop.campaign.excited import Excited, as_excited, given, span_of
+from twinloop.campaign.data.mistaken import flight_of
+from twinloop.campaign.excited import Excited, as_excited, given, hows, span_of
 from twinloop.controllers import PID, StateFeedback, UnboundFamily
 from twinloop.controllers.riccati import solve_linear
 from twinloop.identification.records import Run, guessed_noise
@@ -70,20 +71,25 @@ BEYOND = 1.0
 
 @dataclass(frozen=True, eq=False)
 class FlownOtherwise(Replay):
-    """Commands of a test that its law gave with other gains than those that were asked for.
+    """Commands of a test that its law gave with other gains than those that were asked for, or that are another test's.
 
     Args:
         asked: the test.
-        genes: gains that were flown (size,), in their units.
+        flown: the same with the gains that were flown; or the other test.
     """
 
     asked: Test = field(kw_only=True)
-    genes: Floats = field(kw_only=True)
+    flown: Test = field(kw_only=True)
 
     @property
-    def flown(self) -> Test:
-        """The test with the gains that were flown."""
-        return replace(self.asked, genes=self.genes)
+    def genes(self) -> Floats:
+        """Gains that were flown (size,), in their units."""
+        return self.flown.genes
+
+    @property
+    def of_another(self) -> bool:
+        """Whether another test was flown."""
+        return self.flown.number != self.asked.number
 
     @property
     def named(self) -> list[str]:
@@ -96,23 +102,32 @@ class FlownOtherwise(Replay):
         ]
 
 
-def flown_otherwise(test: Test, run: Trajectory, controller: UnboundFamily) -> FlownOtherwise | None:
-    """The commands of a test whose gains were others than it asks for; None where that is not certain.
+def flown_otherwise(
+    test: Test, run: Trajectory, controller: UnboundFamily, others: Sequence[Test] = ()
+) -> FlownOtherwise | None:
+    """The commands of a test that was flown with other gains than it asks for; None where that is not certain.
 
     Args:
         test: as it was asked for.
         run: that was recorded of it.
         controller: the family as it was described.
+        others: further tests, one of which may have been flown in its place.
     """
+    other = flight_of(test, run, others)
+    if other is not None:
+        return FlownOtherwise(test.signals, run.states[0], run.commands, asked=test, flown=other)
     genes = _gains(test, run) if isinstance(controller, LINEAR) else None
     if genes is None:
         return None
-    found = FlownOtherwise(test.signals, run.states[0], run.commands, asked=test, genes=genes)
+    flown = replace(test, genes=genes)
+    found = FlownOtherwise(test.signals, run.states[0], run.commands, asked=test, flown=flown)
     return found if found.named else None
 
 
 def from_other_gains(experiments: Sequence[Experiment]) -> Iterator[Remark]:
-    """That tests were flown with other gains than they ask for: no more than a note once a later one was not.
+    """That tests were flown with other gains than they ask for, or other tests in their place.
+
+    It is no more than a note once a later one was flown as it asks for.
 
     Args:
         experiments: as they count, in the order of `tell`.
@@ -122,7 +137,16 @@ def from_other_gains(experiments: Sequence[Experiment]) -> Iterator[Remark]:
         run = each.replayed
         if not isinstance(run, FlownOtherwise):
             continue
-        yield (note if place < last else serious)(
+        say = note if place < last else serious
+        if run.of_another:
+            yield say(
+                "other-test",
+                f"What was told as test {run.asked.number} is a flight of test {run.flown.number}, by its recorded"
+                f" commands: withdraw it, and tell it as test {run.flown.number}. Until then it is learnt under these"
+                " commands, and its quality counts for no gains.",
+            )
+            continue
+        yield say(
             "other-gains",
             f"Test {run.asked.number} was flown with other gains than it asks for, by its recorded commands:"
             f" {', '.join(run.named)}. It is learnt under these commands, and its quality counts for no gains. Check"
@@ -135,7 +159,7 @@ def _gains(test: Test, run: Trajectory) -> Floats | None:
     record = _Record.of(test, run)
     if record is None:
         return None
-    fits = [record.fitted(how) for how in _hows(test)]
+    fits = [record.fitted(how) for how in hows(test)]
     genes, left = min(fits, key=lambda fit: fit[1])
     if not left < min(SMALL * record.size, CLEARLY * record.off):
         return None
@@ -180,7 +204,7 @@ class _Record:
         low, high = np.array([command.bounds for command in test.signals.commands]).T
         sent = commands / span
         asked, off = np.zeros_like(sent), np.full(sent.shape[1], np.inf)
-        for how in _hows(test):
+        for how in hows(test):
             gave = _asked(as_excited(test, how), states)
             apart = np.square(sent - gave).mean(axis=0)
             size = float(np.square(gave - gave.mean(axis=0)).mean())
@@ -239,7 +263,7 @@ class _Record:
             there = np.clip(places + lag, 0, rows)
             columns += [self.states[there, i] - self.states[:-1, i] for i in read]
         design = np.stack(columns, axis=1)
-        for how in _hows(self.test):
+        for how in hows(self.test):
             asked = _asked(as_excited(self.test, how), self.states)
             for late in LATE:
                 there = np.clip(places - late, 0, rows - 1)
@@ -266,11 +290,6 @@ class _Record:
 
     def _left(self, gave: Floats) -> float:
         return float(np.square(self.sent - gave)[self.free].mean())
-
-
-def _hows(test: Test) -> list[Excited]:
-    """In which ways a test's excitation may have been flown."""
-    return [how for how in Excited if how is Excited.HELD_BACK or test.excitation is not None]
 
 
 def _asked(test: Test, states: Floats) -> Floats:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.excited import Excited, apart, as_excited, excited, given, hidden, span_of
+from twinloop.campaign.data.rows import late_commands
+from twinloop.campaign.excited import Excited, apart, as_excited, excited, given, hidden, hows, span_of
 from twinloop.campaign.history import Experiment
 from twinloop.remarks import Remark, note, serious
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+from twinloop.unmeasured import completed_readings
 
 OTHER = 0.5
 """Share of what a command does, or all do on average, that may differ from what their controller gives, squared."""
@@ -22,6 +24,8 @@ LEVELS = 5
 """Values that commands have at most that are sent in pulses."""
 EXCHANGED = 20.0
 """Times nearer to the controller's that two commands are once exchanged, in squares, where that was the fault."""
+WITH_STATE = 100.0
+"""The same of a command and a state: there is one column alone to be held against the controller."""
 PULSES = 2.0
 """Times the span of a command that pulses may be behind or ahead of it."""
 
@@ -53,12 +57,21 @@ def exchanged(run: Experiment) -> tuple[int, int] | None:
     return None if run.test is None else _exchanged(*sent_and_asked(run.test, run.trajectory), run.test)
 
 
+def exchanged_with_state(run: Experiment) -> tuple[str, str] | None:
+    """A state and a command, which is that of the test's controller once their columns are exchanged; None: no two are.
+
+    Args:
+        run: of a test.
+    """
+    return None if run.test is None else _exchanged_with_state(run.test, run.trajectory)
+
+
 def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) -> Iterator[Remark]:
     """Tests whose recorded commands are none that their controllers give.
 
     Args:
         tests: their numbers.
-        exchanged: names of two commands with which they would be, once exchanged; empty: there are none.
+        exchanged: names of two columns with which they would be, once exchanged; empty: there are none.
     """
     if tests:
         hint = f" They would be with {' and '.join(exchanged)} exchanged." if exchanged else ""
@@ -117,11 +130,25 @@ def _exchanged(sent: Floats, asked: Floats, test: Test) -> tuple[int, int] | Non
     return None
 
 
+def _exchanged_with_state(test: Test, run: Trajectory) -> tuple[str, str] | None:
+    signals = test.signals
+    before = apart(*sent_and_asked(test, run), test)
+    for j, i in product(np.flatnonzero(before > LITTLE * LITTLE).tolist(), signals.measured):
+        states, sent = run.states.copy(), run.commands.copy()
+        states[:-1, i], sent[:, j] = run.commands[:, j], run.states[:-1, i]
+        if signals.unmeasured:
+            states = completed_readings(states[:, signals.measured], signals, states[0])
+        asked = [given(as_excited(test, how), states) for how in hows(test)]
+        if WITH_STATE * min(apart(sent, each, test)[j] for each in asked) <= before[j]:
+            return signals.state_names[i], signals.command_names[j]
+    return None
+
+
 def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
     """Tests in which what was sent is not what the controller gives, by number: whether it was sent in pulses."""
     found: dict[int, bool] = {}
     for run in experiments:
-        if run.test is None or run.test.number in found:
+        if run.test is None or run.test.number in found or any(late_commands(run.test, run.trajectory)):
             continue
         sent, asked = sent_and_asked(run.test, run.trajectory)
         span = span_of(run.test)
@@ -130,7 +157,10 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
         far = (off > OTHER * np.maximum(size, size.mean())) & (off > LITTLE * LITTLE)
         if far.any():
             found[run.test.number] = _pulses(sent[:, far], asked[:, far], span[far])
-        elif _exchanged(sent, asked, run.test) is not None:
+        elif (
+            _exchanged(sent, asked, run.test) is not None
+            or _exchanged_with_state(run.test, run.trajectory) is not None
+        ):
             found[run.test.number] = False
     return found
 

@@ -15,8 +15,10 @@ from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.gains import FlownOtherwise, from_other_gains
 from twinloop.campaign.data.lateness import late
 from twinloop.campaign.data.readings import suspicious
+from twinloop.campaign.data.rows import from_late_commands, in_other_rows
 from twinloop.campaign.data.sent import (
     exchanged,
+    exchanged_with_state,
     from_another_excitation,
     from_other_controllers,
     other_commands,
@@ -178,19 +180,29 @@ def against(
     run = flight.trajectory
     found = _checked(run.t, run.states, run.commands, signals, lines, compared=False).remarks
     others = other_commands([flight])
-    pair = exchanged(flight) if others else None
-    names = [signals.commands[i].name for i in pair or ()]
+    names = _exchanged(flight, signals) if others else ()
+    late = in_other_rows([flight])
     if isinstance(flight.replayed, FlownOtherwise):
         asked = flight.replayed.flown
-    excitations = () if asked is None else from_another_excitation(asked, run)
+    # In other rows than its own no excitation is what it seems to be.
+    excitations = () if asked is None or late else from_another_excitation(asked, run)
     return [
         *(each for each in found if each.serious),
+        *from_late_commands(late),
         *from_other_controllers(others, names),
         *from_other_gains([flight]),
         *from_other_starts([flight], serious),
         *ended_early(flight),
         *excitations,
     ]
+
+
+def _exchanged(flight: Experiment, signals: Signals) -> Sequence[str]:
+    """Two columns that are exchanged, by the recorded commands; empty where none are."""
+    pair = exchanged(flight)
+    if pair is not None:
+        return [signals.command_names[i] for i in pair]
+    return exchanged_with_state(flight) or ()
 
 
 def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) -> Iterator[Remark]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
+from twinloop.campaign.data.rows import Late, from_late_commands
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.history import Experiment
@@ -32,6 +33,7 @@ class Findings:
         follows: whether the twin follows them when it is flown by itself.
         misses: states that its free runs miss by more than noise and known disturbances explain.
         others: numbers of the tests whose recorded commands are none that their controllers give.
+        late: commands that are recorded in other rows than the readings that they were computed from.
         recurring: states whose disturbance comes again in flight after flight.
         unanswered: whether commands moved and no state did, which is said already.
         unmoved: states that move though their equations say that nothing moves them.
@@ -44,6 +46,7 @@ class Findings:
     follows: bool
     misses: Sequence[Miss] = ()
     others: Sequence[int] = ()
+    late: Sequence[Late] = ()
     recurring: tuple[str, ...] = ()
     unanswered: bool = False
     unmoved: Sequence[str] = ()
@@ -76,6 +79,7 @@ def diagnostics_of(
         *wrapped,
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
+        *from_late_commands(found.late),
         *from_other_controllers(found.others),
         *_unmoved(found.unmoved),
     ]
@@ -122,8 +126,8 @@ def _does_not_follow(explained: bool, without_test: bool, disturbed: Sequence[st
         )
     else:
         cause = (
-            "there is an effect that no term describes, such as a contact, backlash, stiction or"
-            " an unmeasured state; the records show no wrong sign or unit"
+            "there is an effect that no term describes, such as a contact, backlash, stiction or an unmeasured state;"
+            " or the records have a fault that their checks do not show"
         )
     yield serious(
         "does-not-follow",

@@ -11,6 +11,7 @@ from twinloop._ground.streams import Unit
 from twinloop.campaign.data.begun import from_other_starts
 from twinloop.campaign.data.gains import from_other_gains
 from twinloop.campaign.data.levels import levels_said
+from twinloop.campaign.data.rows import in_other_rows
 from twinloop.campaign.data.sent import other_commands
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
@@ -113,6 +114,7 @@ def findings(
         follows=answer.follows or not np.isfinite(identified.chi_squared),
         misses=answer.misses(flights, setup, workers),
         others=() if answer.follows else other_commands(book.experiments),
+        late=in_other_rows(book.experiments),
         recurring=tuple(names[state] for state, cause in answer.causes.items() if cause == "law"),
         unanswered=any(each.serious and each.code == "never-moved" for each in identified.remarks),
         unmoved=[names[state] for state in answer.unmoved],
