@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from twinloop import _core
 from twinloop._experiment.replay import Replay
 from twinloop._ground.texts import in_unit, text
+from twinloop.campaign.data.begun import not_ready
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
@@ -18,10 +17,6 @@ from twinloop.objectives import frozen_error
 from twinloop.test import Test, final_distance
 from twinloop.trajectory import Trajectory, check_recorded, completed, continued
 
-FAR = 5.0
-"""A first reading is refused if it is this many times further off than the second, and than the next readings move."""
-NEXT = 9
-"""Readings after the first that are looked at for this."""
 Judge = Callable[[Experiment], float | None]
 """The error, on a run, of what is known so far; None where nothing is."""
 
@@ -149,17 +144,11 @@ def check_first_reading(trajectory: Trajectory, test: Test) -> None:
         test: that was flown.
 
     Raises:
-        InvalidInput: a state that begins far off, with the next readings where they should be.
+        InvalidInput: a state that begins far off, with the next readings where they should be, and with readings of
+            its rate that did not take it there.
     """
-    if trajectory.steps < NEXT:
-        return
-    scales = np.array([state.scale for state in test.family.signals.states])
-    first, second = np.abs(trajectory.states[:2] - test.initial_state)
-    # What the next readings do of themselves: their noise, and what the system does in a period.
-    usual = np.abs(np.diff(trajectory.states[1 : NEXT + 1], axis=0)).max(axis=0)
-    wrong = (first > 0.01 * scales) & (first > FAR * second) & (first > FAR * usual)
-    for i in np.flatnonzero(wrong):
-        state = test.family.signals.states[int(i)]
+    for i in not_ready(test, trajectory):
+        state = test.signals.states[i]
         raise InvalidInput(
             f"Campaign.tell: expected {state.name} to begin near {in_unit(f'{test.initial_state[i]:g}', state.unit)},"
             f" found {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the"

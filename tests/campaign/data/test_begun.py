@@ -7,11 +7,13 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
+from late_sensors import BODY
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign import standing
-from twinloop.campaign.data.begun import off_start
+from twinloop.campaign.data.begun import not_ready, off_alone, off_start
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.calibration import misses
+from twinloop.errors import RemarkWarning
 
 
 def rig(noise=0.0):
@@ -86,3 +88,53 @@ def test_a_flight_that_is_shorter_than_its_test_is_said_so_at_once():
     aborted = tl.Trajectory(whole.t[:13], whole.states[:13], whole.commands[:12], "aborted", "a gust")
     it.tell(test, aborted)
     assert "short-flight" not in {remark.code for remark in against(it.experiments[1], test, SIGNALS)}
+
+
+FAST = tl.Signals([tl.State("x", "m", 1.0)], [tl.Command("u", "N", (-1.0, 1.0))], 1.0)
+
+
+class Quick(tl.System):
+    """It forgets within a period where it began, which is not where it should have."""
+
+    signals, default_gains = FAST, {"x->u": 0.3}
+
+    def run(self, test):
+        controller, states, commands = test.controller(), [1.5], []
+        controller.reset()
+        for k in range(test.steps):
+            commands.append(controller.command(np.array(states[-1:]), test.target(k)))
+            states.append(0.02 * states[-1] + 0.1 * commands[-1][0])
+        return tl.Trajectory(np.arange(test.steps + 1.0), np.array(states)[:, None], np.array(commands))
+
+
+def test_a_flight_that_began_elsewhere_and_was_there_within_a_period_is_kept_and_said_so():
+    it = tl.Campaign(
+        FAST, controller=tl.controllers.StateFeedback(None, (-1.0, 1.0)), initial_state=[0.0], target_state=[0.1],
+        duration=20.0, threads=1, options=SMALL, progress=None,
+    )  # fmt: skip
+    with pytest.warns(RemarkWarning) as said:
+        it.run(Quick(), 1)
+    (flight,) = it.experiments
+    assert flight.off_start == (0,) and off_alone(flight.test, flight.trajectory) == (0,)
+    (sentence,) = (str(each.message) for each in said if "(first-reading)" in str(each.message))
+    assert "x is 1.5 m in the first row and -0.012 m in the second" in sentence
+
+
+def test_only_a_sensor_of_its_rate_tells_that_a_state_cannot_have_begun_where_it_was_read():
+    test = campaign().test(PENDULUM_GAINS)
+    run = rig().run(test)
+    for rates, contradicted in (([0.0, 0.0], (0,)), ([-20.0, 0.0], ())):
+        states = run.states.copy()
+        states[0, 0], states[:2, 1] = 1.5, rates
+        assert not_ready(test, replace(run, states=states)) == contradicted
+
+
+def test_an_attitude_is_held_against_its_body_rates():
+    controller = tl.controllers.StateFeedback(["a", "b", "c"], (-1.0, 1.0)).bind(BODY)
+    test = tl.Test(controller, np.zeros(controller.size), np.zeros(6), np.zeros(6), 20)
+    states = np.zeros((21, 6))
+    states[0, 0] = 1.0
+    for rate, contradicted in ((0.1, (0,)), (20.0, ())):
+        states[:2, 3] = rate, 0.0
+        run = tl.Trajectory(BODY.dt * np.arange(21), states, np.zeros((20, 3)))
+        assert 0 in off_alone(test, run) and not_ready(test, run) == contradicted

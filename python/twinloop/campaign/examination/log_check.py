@@ -10,7 +10,7 @@ import numpy as np
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import in_unit, two_digits
-from twinloop.campaign.data.begun import ended_early, from_other_starts
+from twinloop.campaign.data.begun import ended_early, from_first_readings, from_other_starts
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.gains import FlownOtherwise, from_other_gains
 from twinloop.campaign.data.lateness import late
@@ -192,6 +192,7 @@ def against(
         *from_other_controllers(others, names),
         *from_other_gains([flight]),
         *from_other_starts([flight], serious),
+        *from_first_readings(flight),
         *ended_early(flight),
         *excitations,
     ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
-from twinloop.campaign.data.rows import Late, from_late_commands
+from twinloop.campaign.data.rows import Late
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.history import Experiment
@@ -33,7 +33,8 @@ class Findings:
         follows: whether the twin follows them when it is flown by itself.
         misses: states that its free runs miss by more than noise and known disturbances explain.
         others: numbers of the tests whose recorded commands are none that their controllers give.
-        late: commands that are recorded in other rows than the readings that they were computed from.
+        late: commands that are recorded in other rows than the readings that they were computed from, which is said
+            already.
         recurring: states whose disturbance comes again in flight after flight.
         unanswered: whether commands moved and no state did, which is said already.
         unmoved: states that move though their equations say that nothing moves them.
@@ -79,13 +80,12 @@ def diagnostics_of(
         *wrapped,
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
-        *from_late_commands(found.late),
         *from_other_controllers(found.others),
         *_unmoved(found.unmoved),
     ]
     said += _in_pieces(experiments, found.pieces, signals.dt)
     if not found.follows:
-        explained = found.unanswered or any(remark.serious for remark in said)
+        explained = found.unanswered or bool(found.late) or any(remark.serious for remark in said)
         said += _does_not_follow(explained, found.without_test, found.disturbed)
     else:
         said += _free_run(found.misses, len(experiments), signals) if found.misses else ()

@@ -11,7 +11,7 @@ from twinloop._ground.streams import Unit
 from twinloop.campaign.data.begun import from_other_starts
 from twinloop.campaign.data.gains import from_other_gains
 from twinloop.campaign.data.levels import levels_said
-from twinloop.campaign.data.rows import in_other_rows
+from twinloop.campaign.data.rows import from_late_commands, in_other_rows
 from twinloop.campaign.data.sent import other_commands
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
@@ -70,6 +70,8 @@ def lesson_of(
         normalised=tuple(each.normalised for each in free),
         follows=answer.follows,
         remarks=(
+            # What is wrong with a log may be the reason for all others.
+            *from_late_commands(found.late),
             *identified.remarks,
             *said_inside(book.experiments, flights, signals.dt),
             *shortened(selected, signals.dt),
