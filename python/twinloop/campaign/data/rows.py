@@ -111,9 +111,9 @@ def _said(found: Late) -> Remark:
         f"commands-{late}",
         f"{enumerated(names)} of test{'s' * (len(tests) > 1)} {', '.join(map(str, tests))}"
         f" {'are' if several else 'is'} recorded {rows} {late}: row k has what the controller gives for the readings of"
-        f" row k {other} {abs(shift)}.{cause} move the column{'s' * several} {to} by {rows}, withdraw the flight, and"
-        " tell it again. Each row has the command that was computed from its readings; what takes effect later is then"
-        " learnt as a delay.",
+        f" row k {other} {abs(shift)}.{cause} move the column{'s' * several} {to} by {rows}, withdraw the"
+        f" {'flights, and tell them' if len(tests) > 1 else 'flight, and tell it'} again. Each row has the"
+        " command that was computed from its readings; what takes effect later is then learnt as a delay.",
     )
 
 
