@@ -55,7 +55,7 @@ FRONTS = {
     "law/exports": "environment export gymnasium_source taking",
     "law/exports/fmu": "running unit",
     "law/linear": "friction margins plant state_space storage",
-    "planning": "excitation gains gusts judging leaving planner proposal quality scored seen settings",
+    "planning": "excitation failed gusts judging leaving planner proposal quality scored seen settings",
     "records": "reading",
     "reproduce": "command",
     "store": "uninterrupted",

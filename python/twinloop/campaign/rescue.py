@@ -7,7 +7,7 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from twinloop.logs.files import write_columns
+from twinloop.logs import write_columns
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 

@@ -14,7 +14,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.flights import disagreements
 from twinloop.planning.beyond import bears_ending
 from twinloop.planning.candidates import Candidates
-from twinloop.planning.gains import nearby
+from twinloop.planning.failed import stand_for_failed
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.reach import reach_of
@@ -144,7 +144,7 @@ class Comparison:
 
     def _possible(self) -> Flags:
         """Candidates that are no flight that failed, or was cut, once more."""
-        possible = ~nearby(self.judge.family, self.drafts.genes, self.flown.failed)
+        possible = ~stand_for_failed(self.judge, self.members, self.drafts.genes, self.flown.failed)
         possible[self.drafts.repeats :] &= self.flown.flies
         # Where all of them are, the safest of them is still the best that can be said.
         return possible if possible.any() else np.ones_like(possible)

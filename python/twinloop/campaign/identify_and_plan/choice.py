@@ -24,7 +24,7 @@ from twinloop.campaign.identify_and_plan.track_record import (
 )
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotTrusted
-from twinloop.planning.gains import nearby
+from twinloop.planning.failed import stand_for_failed
 from twinloop.planning.gusts import Moved
 from twinloop.planning.judging import Committee, Judged, expected, risk
 from twinloop.planning.planner import Planner
@@ -138,8 +138,10 @@ class Choice:
             return "the twin does not follow the runs that it was learnt from"
         if flown is None and promised_in_vain(self.book.experiments):
             return "the twin predicted flights to their end, and each of them was cut"
-        if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
-            return "a flight with gains close to those that the twin prefers failed or was cut"
+        if stand_for_failed(self.planner, members, tuned[np.newaxis], standing.unfit(self.book))[0]:
+            return (
+                "a flight with gains close to those that the twin prefers, or alike on it, failed or was cut"
+            )
         if flown is not None and self.misses and self._tuned_have_flown():
             return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
         if self._no_gains_count(members, judged):
