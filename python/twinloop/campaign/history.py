@@ -65,7 +65,8 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     @property
     def complete(self) -> bool:
         """Whether it ran to its end."""
-        return self.trajectory.ended == "completed" and self.trajectory.steps == self.replayed.steps
+        flown = self.replayed.flown if isinstance(self.replayed, FlownOtherwise) else self.replayed
+        return self.trajectory.ended == "completed" and self.trajectory.steps == flown.steps
 
     @property
     def kept_envelope(self) -> bool:
