@@ -36,6 +36,9 @@ from twinloop.law.noise import CorrelatedDisturbance, Noise
 from twinloop.remarks import Remark
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+needs_both = pytest.mark.skipif(
+    None in map(shutil.which, ("cc", "c++")), reason="needs compilers of C and C++"
+)
 
 
 @ALL
@@ -433,6 +436,45 @@ def test_a_controller_in_c_commands_the_same(which):
     single = controller_c(CONTROLLERS[which], family, genes, "loop", "float")
     assert "double" not in single[1]
     c_controller(*single, "loop", 2, "float")(states, target)
+
+
+@needs_both
+def test_a_program_in_cpp_calls_a_twin_and_its_controller_in_c(tmp_path):
+    twin = twin_of(PENDULUM, offsets=(0.08, 0.0))  # late, so that functions of its sensors are declared, too
+    twin.export(tmp_path / "rig.c")
+    family, genes, *_ = led(CONTROLLERS["state feedback"], 1)
+    for suffix, text in zip(
+        "hc", controller_c(CONTROLLERS["state feedback"], family, genes, "loop"), strict=True
+    ):
+        (tmp_path / f"loop.{suffix}").write_text(text)
+    (tmp_path / "main.cpp").write_text(
+        """
+#include "loop.h"
+#include "rig.h"
+int main()
+{
+    rig_memory memory;
+    rig_sensors sensors;
+    double x[2] = {0.1, 0.0}, u[2] = {0.5, 1.0}, reading[2];
+    rig_reset(&memory);
+    rig_clip(u);
+    rig_step(&memory, x, u, x);
+    rig_begin(&sensors);
+    rig_read(&sensors, x, reading);
+    loop_memory loop;
+    double state[3] = {0.1, 0.0, 0.0}, target[3] = {0.0, 0.0, 0.0};
+    loop_reset(&loop);
+    loop_command(&loop, state, target, u);
+    return x[0] == 0.1;
+}
+"""
+    )
+    subprocess.run(["cc", "-std=c99", "-c", "rig.c", "loop.c"], cwd=tmp_path, check=True)
+    strict = ["-Wall", "-Wextra", "-Werror"]
+    subprocess.run(
+        ["c++", *strict, "-o", "both", "main.cpp", "rig.o", "loop.o", "-lm"], cwd=tmp_path, check=True
+    )
+    subprocess.run([tmp_path / "both"], check=True)
 
 
 def test_a_periodic_state_is_taken_away_as_the_model_sees_it():

@@ -8,7 +8,7 @@ from twinloop.law.exports.c_actuation import actuation_c
 from twinloop.law.exports.c_outputs import functions_c, outputs_c
 from twinloop.law.exports.c_sensors import sensor_c, sensor_header
 from twinloop.law.exports.c_step import attitude_c, step_c
-from twinloop.law.exports.c_words import listed, number
+from twinloop.law.exports.c_words import BEGIN_C, END_C, listed, number
 from twinloop.law.exports.left_out import left_out
 from twinloop.law.law import Law
 
@@ -49,6 +49,7 @@ def _header(law: Law, name: str, precision: str) -> str:
         f"#define {big}_COMMANDS {signals.n_u}",
         f"#define {big}_DT {number(signals.dt, precision)}",
         "",
+        *BEGIN_C,
         f"typedef {precision} {name}_real;", "",
         "/* What its actuators and hidden states remember. */",
         "typedef struct {",
@@ -65,7 +66,7 @@ def _header(law: Law, name: str, precision: str) -> str:
         "/* The state a period after x, under the commands u; next may be x. */",
         f"void {name}_step({name}_memory *memory, const {name}_real x[{signals.n_x}],",
         f"    const {name}_real u[{signals.n_u}], {name}_real next[{signals.n_x}]);", "",
-        *sensor_header(law, name), "#endif", "",
+        *sensor_header(law, name), *END_C, "#endif", "",
     ])  # fmt: skip
 
 

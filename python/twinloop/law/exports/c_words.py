@@ -6,6 +6,12 @@ from collections.abc import Sequence
 
 from twinloop.law.law import Law
 
+BEGIN_C = ("#ifdef __cplusplus", 'extern "C" {', "#endif", "")
+"""Opens what a header declares: programs in C++ look for a function of C by its bare name."""
+
+END_C = ("#ifdef __cplusplus", "}", "#endif", "")
+"""Closes it."""
+
 
 def number(value: float, precision: str) -> str:
     """A literal with all its digits.

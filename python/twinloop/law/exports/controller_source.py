@@ -11,6 +11,7 @@ from twinloop._core import __version__
 from twinloop._ground.arrays import Floats
 from twinloop.controllers import PID, Cascade, Family, Mixer, StateFeedback, UnboundFamily
 from twinloop.errors import NotAvailable
+from twinloop.law.exports.c_words import BEGIN_C, END_C
 from twinloop.signals import Signals
 from twinloop.unmeasured import in_words
 
@@ -280,11 +281,12 @@ def controller_c(
         f"   Commands: {', '.join(signals.command_names)}",
         "   Gains:", *gains, "*/",
         f"#ifndef {big}_H", f"#define {big}_H", "",
+        *BEGIN_C,
         f"typedef {precision} {name}_real;", "",
         f"typedef struct {{\n    {name}_real values[{max(1, memory)}];\n}} {name}_memory;", "",
         "/* Forgets the run so far. */", f"void {name}_reset({name}_memory *memory_);", "",
         "/* What to send for the coming period, within the bounds, for a measured state and a target. */",
-        f"{declared};", "", "#endif", "",
+        f"{declared};", "", *END_C, "#endif", "",
     ])  # fmt: skip
     body = []
     for line in lines:
