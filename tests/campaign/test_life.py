@@ -12,6 +12,7 @@ from lives import FULL_LIFE, PLANT, SIGNALS, begun, by_hand, cut, lived, made, o
 from lives import new as begin
 from oracles import same_bits
 from twinloop.campaign.examination import log_check
+from twinloop.campaign.history import called
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.text import render
 
@@ -43,6 +44,18 @@ def test_an_attached_flight_is_learnt_from_and_judged_under_its_recorded_command
     one_step = twin.predict(states[:-1], record.commands)
     assert row.open_loop == pytest.approx(in_scales(one_step - states[1:]), rel=1e-9)
     assert row.normalised < 0.05
+
+
+def test_an_attached_flight_is_called_by_its_log_or_by_its_number():
+    campaign = begun()
+    for seed, log in enumerate(("", "a.csv", "b.csv", "b.csv", "two\nlines")):
+        campaign.attach(by_hand(30, seed), log)
+    names = ("test 0", "log 1", "a.csv", "b.csv (log 3)", "b.csv (log 4)", "two lines")
+    assert called(campaign.experiments) == names
+    again = tl.Campaign.from_record(json.loads(to_json(campaign.to_record())), threads=1)
+    assert called(again.experiments) == names
+    with pytest.raises(tl.InvalidInput, match=r"Campaign\.attach, log: expected a text"):
+        campaign.attach(by_hand(30, seed=9), 7)
 
 
 def test_commands_beyond_a_bound_are_flown_as_they_were_sent():

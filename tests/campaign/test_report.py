@@ -231,6 +231,6 @@ def test_a_campaign_draws_itself(tmp_path):
     campaign.plot(tmp_path / "runs.svg")
     text = (tmp_path / "runs.svg").read_text(encoding="utf-8")
     assert ElementTree.fromstring(text).tag.endswith("svg")
-    assert "test 0" in text and "attached" in text and "integrated absolute error" in text
+    assert "test 0" in text and "log 1" in text and "integrated absolute error" in text
     with pytest.raises(tl.InvalidInput, match="to end in"):
         campaign.plot(tmp_path / "runs.gif")

@@ -9,7 +9,10 @@ import twinloop as tl
 from browser import SIZES, browser, kept, opened, serious
 from command import invoke
 from lives import RIG, SIGNALS, by_hand
+from twinloop._ground.texts import two_digits
 from twinloop.campaign.from_logs import learnt_from_logs
+from twinloop.faces.figures.figure import Line
+from twinloop.faces.figures.flights import flights, unseen
 from twinloop.logs import write_columns
 
 
@@ -68,8 +71,12 @@ def test_the_page_has_what_there_is_and_nothing_of_a_controller(folder, done):
         and 'figure id="coverage"' in page
         and "under its recorded commands" in page
     )
-    assert "of them held out" in page and "For a log, which it had not learnt from" in page
-    assert ">log<" in page and ">record<" not in page and "a record" not in page
+    assert "of them held out" in page and "For 2.csv, which it had not learnt from" in page
+    assert "The twin against 2.csv" in page and "did not predict" not in page and "predicted 2.csv" in page
+    assert "learnt from these flights, but for 2.csv" in page
+    for name in ("0.csv", "1.csv", "2.csv"):
+        assert f">{name}<" in page and f">{name}: angle<" in page and f">{name}: rate<" in page
+    assert ">log<" not in page and ">record<" not in page and "a record" not in page
     for absent in (
         "twinloop learn<",
         'id="controller"',
@@ -150,6 +157,31 @@ def test_logs_of_an_unstable_system_are_judged_in_pieces_and_its_twin_is_written
     assert found["follows"] and all(0.5 <= log["piece"] < 0.5 * log["seconds"] for log in found["logs"])
     assert all(fit > 70.0 for log in found["logs"] for fit in log["fit"].values())
     assert "the free run begins again at a reading every" in identified(folder, logs=("3.csv",)).stdout
+
+
+def test_a_page_of_logs_followed_in_pieces_says_so_and_its_lines_break_there():
+    runs = [
+        tl.Trajectory(0.05 * np.arange(len(states)), states, commands[:, np.newaxis])
+        for states, commands in (held_up(3), held_up(4))
+    ]
+    _, campaign = learnt_from_logs(
+        runs[:1], SIGNALS, runs[1:], logs=["a.csv", "b.csv"], options={"committee_size": 4}, threads=1
+    )
+    found = campaign.examine()
+    (flight,), (_, held_out) = found.unseen, found.beside
+    steps = flight.flown.steps
+    assert flight.piece == held_out.piece < steps
+    every = f"begins again at a reading every {two_digits(0.05 * flight.piece)} s"
+    figure = unseen(found)
+    assert every in figure.caption and "no later one was used" not in figure.caption
+    assert "Where a line breaks, the free run begins again at a reading" in flights(found).caption
+    for state, panel in enumerate(figure.panels):
+        (line,) = (mark for mark in panel.marks if isinstance(mark, Line) and mark.role == "twin")
+        (gaps,) = np.nonzero(np.isnan(line.y))
+        begun = np.arange(flight.piece, steps, flight.piece)
+        assert line.x[gaps] == pytest.approx(0.05 * begun)
+        assert line.y[gaps + 1] == pytest.approx(runs[1].states[begun, state])  # from the reading
+        assert line.y[gaps - 1] == pytest.approx(flight.predicted.states[begun, state])  # as far as it came
 
 
 def test_a_log_of_an_unstable_system_that_was_held_out_is_foretold_in_pieces():

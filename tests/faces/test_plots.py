@@ -8,7 +8,6 @@ import pytest
 from matplotlib.figure import Figure
 
 import twinloop as tl
-from twinloop.faces.figures.units import shown_unit
 from twinloop.faces.plots import _near, _runs, campaign_picture
 
 QUICK = {
@@ -82,11 +81,11 @@ def test_a_target_that_no_flight_came_near_is_on_the_axis(campaign):
     far = run.test.target_state + 9.0
     run = SimpleNamespace(number=1, test=replace(run.test, target_state=far), trajectory=run.trajectory)
     beside = SimpleNamespace(run=run, simulated=run.trajectory, places=None)
-    found = SimpleNamespace(twin=SimpleNamespace(noise=None), best=None, beside=[beside])
+    found = SimpleNamespace(twin=SimpleNamespace(noise=None), best=None, beside=[beside], names=["test 1"])
     figure = Figure()
     _runs(figure, SimpleNamespace(signals=campaign.signals, experiments=[run], examine=lambda: found))
     ends = run.trajectory.states[-1]
     for axes, state, target, last in zip(figure.axes, campaign.signals.states, far, ends, strict=True):
-        value = shown_unit(state.unit)[0] * _near(target, last, state)
+        value = _near(target, last, state)
         low, high = axes.get_ylim()
         assert low < value < high

@@ -15,11 +15,12 @@ import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.reaching import Ending, Miss
+from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.faces.certificate import facts
 from twinloop.faces.cli import main
 from twinloop.faces.figures.axis import axis
 from twinloop.faces.figures.catalogue import FIGURES
-from twinloop.faces.figures.figure import Band, Figure, Line, Panel
+from twinloop.faces.figures.figure import Band, Cells, Figure, Line, Panel
 from twinloop.faces.figures.flights import step
 from twinloop.faces.figures.svg import drawing, panel_svg
 from twinloop.faces.report.moot import moot
@@ -162,9 +163,9 @@ def test_a_loop_that_is_unstable_has_no_margins(good):
 def test_what_is_trusted_is_said_with_its_range(page, good):
     runs = [run.trajectory for run in good.experiments]
     assert "within the flown range, for flights of up to 2 s" in first_words(page)
-    angles = np.degrees(np.concatenate([run.states[:, 0] for run in runs]))
+    angles = np.concatenate([run.states[:, 0] for run in runs])
     row = next(row for row in table(page, "ranges") if row[0] == "angle")
-    assert row[1] == "°" and [float(cell.replace("−", "-")) for cell in row[2:]] == pytest.approx(
+    assert row[1] == "rad" and [float(cell.replace("−", "-")) for cell in row[2:]] == pytest.approx(
         [angles.min(), angles.max()], rel=1e-3
     )
 
@@ -238,6 +239,45 @@ def test_lines_stand_where_their_numbers_are():
     high, wide = (float(value) for value in re.search(r'class="plot".*?', text) and (162.0, 312.0))
     path = re.search(r'<path d="(M[^"]+)" class="line a"', text).group(1)
     assert path == f"M0 {high * 0.75:g}M{wide:g} {high * 0.25:g}"  # a gap where a number is none
+
+
+def test_a_long_line_that_is_thinned_keeps_its_gaps():
+    y = np.sin(np.linspace(0.0, 60.0, 20_001))
+    y[::2000] = np.nan
+    path = re.search(
+        r'<path d="(M[^"]+)" class="line a"', panel_svg(Panel("t", [Line(np.arange(y.size), y, "a")]))
+    )
+    assert path.group(1).count("M") == 10
+
+
+def test_the_words_below_a_table_begin_inside_it_however_few_its_columns():
+    words = "identification (experiments learnt)"
+    for columns in (1, 2, 12):
+        cells = Cells(np.zeros((1, columns)), [["1"] * columns], ["log 1"], ["1"] * columns)
+        text = panel_svg(Panel("t", [cells], words))
+        middle = float(
+            re.search(rf'<text x="([0-9.]+)"[^>]*class="label middle">{re.escape(words)}', text)[1]
+        )
+        assert middle - 3.1 * len(words) >= 0.0
+
+
+def test_each_state_of_all_flights_begins_a_line_of_its_own(good, page):
+    part = page[page.index('id="flights"') :]
+    kinds = re.findall(r'<div class="(panel|panel first)"', part[: part.index("</figure>")])
+    assert kinds == ["panel first", *["panel"] * (len(good.experiments) - 1)] * good.signals.n_x
+
+
+def test_a_page_has_one_unit_for_an_angle_whether_it_is_a_state_or_a_command():
+    ball = tl.Signals([tl.State("tilt", "rad", 1.0)], [tl.Command("setpoint", "rad", (-1.0, 1.0))], 0.02)
+    stream = np.random.default_rng(0)
+    commands = np.repeat(stream.uniform(-1.0, 1.0, (15, 1)), 10, axis=0)
+    states = [np.zeros(1)]
+    for command in commands:
+        states.append(0.8 * states[-1] + 0.2 * command)
+    run = tl.Trajectory(ball.dt * np.arange(151), np.array(states), commands)
+    _, campaign = learnt_from_logs([run], ball, options={"committee_size": 4}, threads=1)
+    text = report_page(campaign, "ball", {"name": "a ball"}, {}, controller=False)
+    assert [row[1] for row in table(text, "ranges")[1:]] == ["rad", "rad"] and "°" not in text
 
 
 @pytest.mark.parametrize("log", [False, True])
@@ -403,7 +443,7 @@ def test_a_quality_without_a_unit_leaves_no_gap_in_a_sentence(good, page):
 def test_tables_of_the_report_are_in_the_units_of_its_figures(good, page):
     (row,) = (row for row in table(page, "noise") if row[0] == "angle")
     sensor = summary(good, {"name": "p"}, {})["twin"]["states"][0]["sensor"]
-    assert row[1] == "°" and float(row[3]) == pytest.approx(np.degrees(sensor), rel=1e-3)
+    assert row[1] == "rad" and float(row[3]) == pytest.approx(sensor, rel=1e-3)
 
 
 def test_checks_that_could_not_be_made_are_what_comes_next(good):

@@ -256,7 +256,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         if partial is not None:
             self._warn_of_last(test)
 
-    def attach(self, trajectory: Trajectory) -> None:
+    def attach(self, trajectory: Trajectory, log: str = "") -> None:
         """Adds a run without a test, of any length and under any commands.
 
         The twin is judged on it by its free run under the recorded commands. It has no quality, and `run` does not
@@ -264,6 +264,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Args:
             trajectory: of the same signals.
+            log: what remarks and reports shall call it, such as the name of its file; empty: by its number.
 
         Raises:
             InvalidInput: a useless trajectory; nothing has changed.
@@ -275,7 +276,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
                 ' controllers only; choose preset="default".'
             )
         with self._entering():
-            self._book.enter(attached_run(self.setup, trajectory, self._error_so_far))
+            self._book.enter(attached_run(self.setup, trajectory, self._error_so_far, log))
         self.interrupted = False
         self._warn_of_last(None)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from twinloop import _core
 from twinloop._experiment.replay import Replay
-from twinloop._ground.texts import in_unit, text
+from twinloop._ground.texts import in_unit, one_line, text
 from twinloop.campaign.data.begun import not_ready
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
@@ -47,22 +47,24 @@ def flown_test(setup: Setup, test: Test, trajectory: Trajectory, judge: Judge, l
     return dataclasses.replace(run, before=judge(run))
 
 
-def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge) -> Experiment:
+def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge, log: str = "") -> Experiment:
     """The experiment of an attached run.
 
     Args:
         setup: of the campaign.
         trajectory: what was recorded, of any length.
         judge: the error on it of what is known so far.
+        log: what it is called; empty where nobody has said so.
 
     Raises:
-        InvalidInput: a trajectory that cannot be learnt from.
+        InvalidInput: a trajectory that cannot be learnt from, or a name that is no text.
     """
+    name = one_line(text("Campaign.attach, log", log))
     trajectory = completed(trajectory, setup.signals)
     check_recorded(trajectory, setup.limits, None)
     recorded = continued(trajectory, setup.signals, trajectory.states[0])
     replayed = Replay(setup.signals, recorded.states[0], recorded.commands)
-    run = Experiment(replayed, recorded, None, _frozen(recorded, setup), None, None, attached=True)
+    run = Experiment(replayed, recorded, None, _frozen(recorded, setup), None, None, attached=True, log=name)
     return dataclasses.replace(run, before=judge(run))
 
 

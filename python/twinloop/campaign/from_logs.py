@@ -48,6 +48,7 @@ def learnt_from_logs(
     signals: Signals,
     held_out: Sequence[Trajectory] = (),
     *,
+    logs: Sequence[str] = (),
     seed: int = 0,
     options: Mapping[str, object] | None = None,
     threads: int | None = None,
@@ -59,6 +60,7 @@ def learnt_from_logs(
         runs: at least one, at the signals' period; SI units, radians.
         signals: of the system.
         held_out: runs that are not learnt, to judge the twin on.
+        logs: what each run is called, those that are held out behind the others; empty: by their numbers.
         seed: of all random numbers; equal seeds give equal bits.
         options: other values for some of the preset's options, by name.
         threads: how many the engine may use, by default all that there are.
@@ -88,11 +90,12 @@ def learnt_from_logs(
         threads=threads,
         progress=progress,
     )
+    names = iter(logs or [""] * (len(found) + len(apart)))
     for run in found:
-        campaign.attach(run)
+        campaign.attach(run, next(names))
     twin = campaign.twin
     for run in apart:
-        campaign.attach(run)
+        campaign.attach(run, next(names))
     campaign.interrupted = True  # what was learnt so far is enough
     return twin, campaign
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from typing import Literal
 
 from twinloop._experiment.envelope import gone_from, readings_leave, usages_of
@@ -39,6 +41,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
         final_distance: distance of the last measured state to the target; None if the run was cut, or has no target.
         quality: measured quality, which the campaign minimises; None if the run was cut, or has no target.
         attached: whether it is a run without a test.
+        log: what the log of an attached run is called; empty where nobody has said so.
     """
 
     replayed: Test | Replay
@@ -48,8 +51,9 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     final_distance: float | None
     quality: float | None
     attached: bool = False
+    log: str = ""
 
-    VERSION = IN_SCALES
+    VERSION = 3
 
     @property
     def test(self) -> Test | None:
@@ -107,6 +111,25 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""
         return usages_of(self.replayed.signals, self.trajectory.states)
+
+
+def called(experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """What people call each experiment: "test 3"; of an attached run its log, or "log 2" where no other says which.
+
+    Args:
+        experiments: all of a campaign that count; `withdraw` calls the second one that is attached attached-2.
+    """
+    logs, attached = [run.log for run in experiments], count(1)
+    names = []
+    for run in experiments:
+        if run.number is not None:
+            names.append(f"test {run.number}")
+            continue
+        name = f"log {next(attached)}"
+        if run.log:
+            name = run.log if logs.count(run.log) == 1 else f"{run.log} ({name})"
+        names.append(name)
+    return tuple(names)
 
 
 @dataclass(frozen=True)

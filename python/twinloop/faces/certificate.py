@@ -17,9 +17,9 @@ from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import NotAvailable
 from twinloop.faces.figures.figure import Band, Line, Mark, Panel
-from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
+from twinloop.faces.figures.style import DARK, LIGHT, RULES, SCROLL, variables
 from twinloop.faces.figures.svg import panel_svg
-from twinloop.faces.figures.units import words
+from twinloop.faces.figures.units import labelled, words
 from twinloop.faces.result import plain_dict
 from twinloop.faces.text.words import quality_words
 from twinloop.planning.leaving import risk_of_what, risk_words
@@ -137,7 +137,8 @@ def page(facts: Mapping[str, Any], names: Sequence[str], units: Sequence[str]) -
         what=risk_of_what(bounded),
         degrees=lambda value: None if value is None else math.degrees(value),
         plots=_plots(facts["prediction"], names, units),
-        figures=f":root{{{variables(LIGHT)}}}@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}{RULES}",
+        figures=f":root{{{variables(LIGHT)}}}@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}"
+        f"{RULES}{SCROLL}",
     )
 
 
@@ -177,7 +178,7 @@ def _plots(
     plots = []
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
         # In the unit that is declared, as the tables beside them and the sentences below.
-        label = f"{words(name)} ({unit or '1'})"
+        label = labelled(name, unit)
         marks: list[Mark] = (
             [] if band is None else [Band(t, band[0, :, i], band[1, :, i], "twin", "90 % band")]
         )

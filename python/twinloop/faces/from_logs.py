@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from twinloop._experiment.limits import Limits
-from twinloop._ground.texts import to_type, two_digits
+from twinloop._ground.texts import to_type, whole_characters
 from twinloop._ground.writing import write_whole
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
@@ -21,6 +21,7 @@ from twinloop.faces.report.page import report_page, templates
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.text import table
+from twinloop.faces.text.words import every
 from twinloop.law.twin import Twin
 from twinloop.logs import read_log
 from twinloop.signals import Signals
@@ -71,8 +72,9 @@ def identify(
     runs, apart = ([_flight(file, signals, config) for file in files] for files in (logs, held_out))
     with Watch(options_of("default", options), len(runs), "logs") as watch:
         twin, campaign = learnt_from_logs(
-            runs, signals, apart, seed=seed, options=options, threads=threads, progress=watch
-        )
+            runs, signals, apart, logs=[whole_characters(file.name) for file in (*logs, *held_out)],
+            seed=seed, options=options, threads=threads, progress=watch,
+        )  # fmt: skip
     campaign.progress = None
     found = _facts(twin, [*logs, *held_out], [*runs, *apart], len(runs))
     click.echo(to_json(found) if as_json else _text(twin, found), nl=False)
@@ -155,17 +157,11 @@ def _text(twin: Twin, found: dict[str, Any]) -> str:
         " mean."
     )
     if pieces:
-        every = f"every {_span(pieces)} s"
         note += (
-            f"\nWhere no model could be followed for longer, the free run begins again at a reading {every}."
+            "\nWhere no model could be followed for longer, the free run begins again at a reading"
+            f" {every(pieces)}."
         )
     return (
         "\n".join([*found["equations"], "", errors, note, *([] if not remarks else ["", remarks.rstrip()])])
         + "\n"
     )
-
-
-def _span(values: Sequence[float]) -> str:
-    """From the least to the most."""
-    least, most = (two_digits(value) for value in (min(values), max(values)))
-    return least if least == most else f"{least} to {most}"

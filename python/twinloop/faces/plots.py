@@ -16,7 +16,6 @@ from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, assessment, controller_to_fly
 from twinloop.campaign.examination.beside import Beside
 from twinloop.errors import NotAvailable
-from twinloop.faces.figures.units import shown_unit
 from twinloop.signals import State
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -209,41 +208,40 @@ def _runs(figure: Any, campaign: Campaign) -> None:
     rows = len(states) + banded
     grid = figure.subplots(rows, len(runs), sharex=True, sharey="row", squeeze=False)
     best = found.best
-    for column, each in enumerate(found.beside):
+    for column, (name, each) in enumerate(zip(found.names, found.beside, strict=True)):
         run, predicted = each.run, each.simulated
         start = run.trajectory.t[0]
-        title = "attached" if run.number is None else f"test {run.number}"
+        title = name
         if run.test is not None and best is not None and run.test.number == best.number:
             title += " (best)"
         grid[0, column].set_title(title, loc="left")
         for row, state in enumerate(states):
-            axes, (factor, unit) = grid[row, column], shown_unit(state.unit)
-            flown = factor * run.trajectory.states[:, row]
+            axes, flown = grid[row, column], run.trajectory.states[:, row]
             if run.test is not None:
-                _draw_target(axes, run.test, row, factor, run.trajectory)
+                _draw_target(axes, run.test, row, run.trajectory)
             if predicted.band is not None:
-                low, high = factor * predicted.band[:, :, row]
+                low, high = predicted.band[:, :, row]
                 axes.fill_between(predicted.t, low, high, label="90 % band of the twin", **BAND)
             axes.plot(
                 run.trajectory.t - start, flown, color=INK, linewidth=2.4 if banded else 1.6, label="system"
             )
             axes.plot(
                 predicted.t,
-                factor * predicted.states[:, row],
+                predicted.states[:, row],
                 color=TWIN,
                 linewidth=1.1,
                 linestyle=(0, (4, 2)) if banded else "-",
                 label="twin",
             )
             if column == 0:
-                axes.set_ylabel(f"{state.name.replace('_', ' ')}\n({unit})")
+                axes.set_ylabel(f"{state.name.replace('_', ' ')}\n({state.unit or '1'})")
         if banded:
             _inside_the_band(grid[-1, column], each, first=column == 0)
         grid[-1, column].set_xlabel("time (s)")
-    for row, state in enumerate(states):
+    for row in range(len(states)):
         curves = [run.trajectory.states[:, row] for run in runs]
         curves += [_target(run.test, row, run.trajectory)[1] for run in runs if run.test is not None]
-        grid[row, 0].set_ylim(*_extent([shown_unit(state.unit)[0] * curve for curve in curves]))
+        grid[row, 0].set_ylim(*_extent(curves))
     figure.align_ylabels(grid[:, 0])
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
@@ -264,14 +262,14 @@ def _inside_the_band(axes: Any, found: Beside, first: bool) -> None:
         axes.set_ylabel("all states,\nin the band")
 
 
-def _draw_target(axes: Any, test: Test, row: int, factor: float, flown: Trajectory) -> None:
+def _draw_target(axes: Any, test: Test, row: int, flown: Trajectory) -> None:
     """The target of a state: a line, or a curve where it varies with time."""
     style: dict[str, Any] = {"color": TARGET, "linewidth": 0.8, "linestyle": ":", "label": "target"}
     t, target = _target(test, row, flown)
     if len(target) == 1:
-        axes.axhline(factor * target[0], **style)
+        axes.axhline(target[0], **style)
     else:
-        axes.plot(t, factor * target, **style)
+        axes.plot(t, target, **style)
 
 
 def _target(test: Test, row: int, flown: Trajectory) -> tuple[Floats, Floats]:

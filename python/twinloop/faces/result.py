@@ -177,6 +177,7 @@ def _experiment(campaign: Campaign, run: Experiment, row: TestErrors, identified
     asked = None if test is None or test.number is None else campaign.tests[test.number]
     found: dict[str, object] = {
         "test": run.number,
+        "log": run.log or None,
         "gains": None if test is None else test.parameters,
         "ended": run.trajectory.ended,
         "reason": run.trajectory.reason,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from twinloop._ground.texts import to_type
+from twinloop._ground.texts import to_type, whole_characters
 from twinloop.campaign import Campaign
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
@@ -118,7 +118,7 @@ def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> Log:
     run = found.trajectory()
     _refuse_told(campaign, run, called, None)
     with found.errors():
-        campaign.attach(run)
+        campaign.attach(run, whole_characters(Path(called).name))
     return found
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.examination.unseen import followed
+from twinloop.campaign.examination.unseen import followed, piece_of
 from twinloop.campaign.history import Experiment
 from twinloop.law.twin import Twin
 from twinloop.trajectory import Trajectory, continued
@@ -24,6 +24,7 @@ class Beside:
         places: of the readings in the band, as long as the free run lasts (rows, n_x): 0 its middle, ±1 its ends; None
             without a band.
         inside: share of the readings after the first inside the band; None without one.
+        piece: steps after which the free run begins again at a reading; those of the flight where it never does.
     """
 
     run: Experiment
@@ -31,6 +32,7 @@ class Beside:
     simulated: Trajectory
     places: Floats | None
     inside: float | None
+    piece: int
 
 
 def beside(twin: Twin, run: Experiment) -> Beside:
@@ -43,7 +45,9 @@ def beside(twin: Twin, run: Experiment) -> Beside:
     simulated = twin.free_run(run.replayed, run.trajectory)
     flown = continued(run.trajectory, twin.signals, run.trajectory.states[0])
     _, _, inside = followed(twin, run.trajectory, simulated)
-    return Beside(run, flown, simulated, _places(twin, run.trajectory, simulated), inside)
+    return Beside(
+        run, flown, simulated, _places(twin, run.trajectory, simulated), inside, piece_of(twin, run)
+    )
 
 
 def _places(twin: Twin, flown: Trajectory, simulated: Trajectory) -> Floats | None:

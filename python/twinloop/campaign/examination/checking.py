@@ -92,7 +92,7 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
         return
     last = found.unseen[-1]
-    which = "a log" if last.number is None else f"test {last.number}"
+    which = found.names[last.place]
     good = last.error <= LEFT
     by = f"error {two_digits(last.error)}" if math.isfinite(last.error) else "it diverged"
     yield Check(

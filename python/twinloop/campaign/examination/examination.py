@@ -43,7 +43,7 @@ from twinloop.campaign.examination.use import (
     outside_of,
     strongest_commands,
 )
-from twinloop.campaign.history import Experiment
+from twinloop.campaign.history import Experiment, called
 from twinloop.errors import NotAvailable
 from twinloop.law.law import Law
 from twinloop.law.linear.friction import has_friction, sliding
@@ -128,6 +128,7 @@ class Examination:
         self.campaign = campaign
         self.setup, self.signals = campaign.setup, campaign.signals
         self.experiments: tuple[Experiment, ...] = campaign.experiments
+        self.names = called(self.experiments)
         self.twin: Twin = campaign.twin
         self.twins_before, self._error = earlier.twins, earlier.error
         self.innovations = earlier.innovations

@@ -33,6 +33,7 @@ class Unseen:
         rmse: of each state (n_x,), in its unit; infinite if the free run diverged.
         fit: FIT % of each state (n_x,); NaN if it never moved.
         inside: share of the readings inside the band; None without one.
+        piece: steps after which the free run begins again at a reading; those of the flight where it never does.
     """
 
     place: int
@@ -44,6 +45,7 @@ class Unseen:
     rmse: Floats
     fit: Floats
     inside: float | None
+    piece: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +91,28 @@ def _beside(place: int, run: Experiment, before: TwinBefore, setup: Setup) -> Un
     missed = float(np.square(rmse / sizes).mean()) if lasted else float("inf")
     # Of whole flights as the campaign counts them.
     whole = missed if run.before is None else run.before
-    frozen = None if run.test is not None else _frozen_in_pieces(twin, run.trajectory)
-    error = normalised_error(whole, run.frozen) if frozen is None else normalised_error(missed, frozen)
-    return Unseen(place, run.number, before.learnt, run.trajectory, predicted, error, rmse, fit, inside)
+    piece = piece_of(twin, run)
+    error = normalised_error(whole, run.frozen)
+    if piece < run.trajectory.steps:
+        error = normalised_error(missed, _frozen_in_pieces(twin, run.trajectory, piece))
+    return Unseen(
+        place, run.number, before.learnt, run.trajectory, predicted, error, rmse, fit, inside, piece
+    )
 
 
-def _frozen_in_pieces(twin: Twin, flown: Trajectory) -> float | None:
-    """Error of the model that never moves from where each piece of a record begins; None if it is followed whole."""
-    length = twin.piece_of(flown)
-    if length == flown.steps:
-        return None
-    return float(squares(flown.states[1:], held(flown.states, length), twin.signals).mean())
+def piece_of(twin: Twin, run: Experiment) -> int:
+    """Steps after which the free run of a twin begins again at a reading; those of the flight where it never does.
+
+    Args:
+        twin: that is flown.
+        run: the experiment; under a test's own controller it never does.
+    """
+    return run.trajectory.steps if run.test is not None else twin.piece_of(run.trajectory)
+
+
+def _frozen_in_pieces(twin: Twin, flown: Trajectory, piece: int) -> float:
+    """Error of the model that never moves from where each piece of a record begins."""
+    return float(squares(flown.states[1:], held(flown.states, piece), twin.signals).mean())
 
 
 def followed(twin: Twin, flown: Trajectory, predicted: Trajectory) -> tuple[Floats, Floats, float | None]:

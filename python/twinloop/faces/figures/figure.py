@@ -178,6 +178,7 @@ class Figure:
         panels: at least one.
         caption: what is to be seen, in sentences.
         columns: in which panels stand where there is room.
+        rows: whether panels of a row belong together, so that the next row begins on a line of its own.
     """
 
     name: str
@@ -185,6 +186,7 @@ class Figure:
     panels: Sequence[Panel]
     caption: str = ""
     columns: int = 3
+    rows: bool = False
 
     @property
     def legend(self) -> list[tuple[str, str, str]]:

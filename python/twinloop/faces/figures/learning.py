@@ -9,7 +9,7 @@ import numpy as np
 from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Cells, Figure, Level, Line, Mark, Panel, Spans
-from twinloop.faces.figures.units import quality_label, said, words
+from twinloop.faces.figures.units import quality_label, words
 
 LIGHTEST, DARKEST = -5.0, 0.0
 """Decades of the normalised error from which a cell is lightest, and at which it is darkest."""
@@ -34,7 +34,7 @@ def errors(found: Examination) -> Figure:
                     Cells(
                         np.where(np.isnan(shades), 0.0, shades),
                         texts,
-                        [said(number) for number in by_twin.tests],
+                        found.names,
                         [str(number) for number in by_twin.iterations],
                         marked,
                     )

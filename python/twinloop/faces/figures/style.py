@@ -84,6 +84,16 @@ def _roles() -> str:
     return "\n".join(found)
 
 
+SCROLL = """
+.scroll{overflow-x:auto;background:
+linear-gradient(90deg,var(--under,var(--paper)) 50%,transparent) 0 0/1.6rem 100% no-repeat local,
+linear-gradient(-90deg,var(--under,var(--paper)) 50%,transparent) calc(100% + 1px) 0/1.6rem 100% no-repeat local,
+linear-gradient(90deg,color-mix(in srgb,var(--ink) 30%,transparent),transparent) 0 0/.8rem 100% no-repeat,
+linear-gradient(-90deg,color-mix(in srgb,var(--ink) 30%,transparent),transparent) 100% 0/.8rem 100% no-repeat,
+var(--under,var(--paper))}
+"""
+"""What is wider than its page: an edge beyond which it goes on is shaded, and covered where it ends there."""
+
 RULES = (
     _SHAPES
     + _roles()

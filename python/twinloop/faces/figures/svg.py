@@ -18,6 +18,8 @@ LEFT, RIGHT, TOP, BOTTOM = 58.0, 10.0, 22.0, 36.0
 FINEST = 1400
 """Points of a line at most: more than the screen has columns."""
 CELL = 26.0
+LETTER = 6.4
+"""Width of a letter of a label, about."""
 
 
 def panel_svg(panel: Panel) -> str:
@@ -218,7 +220,7 @@ _DRAWN: dict[type, Callable[[ET.Element, object, Axis, Axis], None]] = {
 
 
 def _table(panel: Panel, cells: Cells) -> ET.Element:
-    left = 14.0 + 6.4 * max((len(name) for name in cells.rows), default=4)
+    left = 14.0 + LETTER * max((len(name) for name in cells.rows), default=4)
     size = max(58.0, (WIDTH - left - RIGHT) / max(1, len(cells.columns)))
     size = min(size, 96.0)
     top = 44.0
@@ -240,9 +242,10 @@ def _table(panel: Panel, cells: Cells) -> ET.Element:
             _add(root, "rect", {**place, **box})
             dark = "on-dark" if math.isfinite(value) and value > 0.5 else "on-light"
             _text(root, left + (j + 0.5) * size, top + (i + 0.5) * CELL + 3.5, words, f"tick middle {dark}")
+    middle = left + 0.5 * size * len(cells.columns)
     _text(
         root,
-        left + 0.5 * size * len(cells.columns),
+        max(middle, 8.0 + 0.5 * LETTER * len(panel.x_label)),  # under few columns it would begin outside
         top + CELL * len(cells.rows) + 18.0,
         panel.x_label,
         "label middle",
@@ -251,13 +254,14 @@ def _table(panel: Panel, cells: Cells) -> ET.Element:
 
 
 def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """At most `FINEST` points, the least and the most of each stretch among them."""
+    """At most `FINEST` points, the least and the most of each stretch and its first gap among them."""
     if len(x) <= FINEST:
         return x, y
     kept = []
     for part in np.array_split(np.arange(len(x)), FINEST // 2):
-        values = np.where(np.isfinite(y[part]), y[part], 0.0)
-        kept += sorted({int(part[np.argmin(values)]), int(part[np.argmax(values)])})
+        there = part[np.isfinite(y[part])]
+        ends = {int(there[np.argmin(y[there])]), int(there[np.argmax(y[there])])} if len(there) else set()
+        kept += sorted(ends | {int(gap) for gap in part[~np.isfinite(y[part])][:1]})
     return x[kept], y[kept]
 
 

@@ -1,8 +1,7 @@
-"""Units of a face: degrees instead of radians."""
+"""Names and units as a face shows them: in the units that are declared, as equations, tables and texts are."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from twinloop.planning.quality import quality_unit
@@ -10,19 +9,8 @@ from twinloop.planning.quality import quality_unit
 if TYPE_CHECKING:
     from twinloop.campaign.examination.examination import Examination
 
-
-def shown_unit(unit: str) -> tuple[float, str]:
-    """The unit of a face: degrees instead of radians.
-
-    Args:
-        unit: of a signal.
-
-    Returns:
-        What to multiply with, and the unit that is shown.
-    """
-    if unit == "rad" or unit.startswith("rad/"):
-        return 180.0 / math.pi, "°" + unit[3:]
-    return 1.0, unit or "1"
+MOST = 28
+"""Letters of a flight's name in a title."""
 
 
 def words(name: str) -> str:
@@ -30,23 +18,17 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def labelled(name: str, unit: str) -> tuple[float, str]:
-    """What to multiply with, and a name with its shown unit."""
-    factor, shown = shown_unit(unit)
-    return factor, f"{words(name)} ({shown})"
+def shortened(name: str) -> str:
+    """What a flight is called, as far as the title of a panel has room for it: files differ at their end."""
+    return name if len(name) <= MOST else f"…{name[1 - MOST :]}"
+
+
+def labelled(name: str, unit: str) -> str:
+    """A name with its unit."""
+    return f"{words(name)} ({unit or '1'})"
 
 
 def quality_label(found: Examination) -> str:
     """The quality with its unit, where it has one."""
     unit = quality_unit(found.setup.quality)
     return f"quality ({unit})" if unit else "quality"
-
-
-def said(number: int | None) -> str:
-    """What a flight is called."""
-    return "log" if number is None else f"test {number}"
-
-
-def in_words(number: int | None) -> str:
-    """What a flight is called in a sentence."""
-    return "a log" if number is None else said(number)

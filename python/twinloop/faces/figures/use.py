@@ -26,23 +26,24 @@ def coverage(found: Examination) -> Figure | None:
     signals = found.signals
     for i in found.moved:
         for j in found.strongest(i):
-            x_factor, x_label = labelled(signals.states[i].name, signals.states[i].unit)
-            y_factor, y_label = 1.0, f"{words(signals.commands[j].name)} ({signals.commands[j].unit or '1'})"
+            x_label, y_label = (
+                labelled(each.name, each.unit) for each in (signals.states[i], signals.commands[j])
+            )
             low, high = signals.commands[j].bounds
             marks: list[Mark] = [
                 Line(
-                    x_factor * states[shown, i],
-                    y_factor * commands[shown, j],
+                    states[shown, i],
+                    commands[shown, j],
                     "measured",
                     "flown",
                     joined=False,
                     faint=True,
                 ),
-                Level(y_factor * low, "limit", "bound of the command"),
-                Level(y_factor * high, "limit"),
+                Level(low, "limit", "bound of the command"),
+                Level(high, "limit"),
             ]
             if planned is not None:
-                x, y = x_factor * planned.states[:-1, i], y_factor * planned.commands[:, j]
+                x, y = planned.states[:-1, i], planned.commands[:, j]
                 marks.insert(1, Line(x, y, "twin", "controller to fly"))
             panels.append(
                 Panel(

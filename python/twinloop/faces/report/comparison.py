@@ -9,7 +9,7 @@ from twinloop import _core
 from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.assessment import number_of, predicted_quality
 from twinloop.campaign.examination.checking import checks
-from twinloop.faces.figures.units import shown_unit, words
+from twinloop.faces.figures.units import labelled, words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables.table import Table, shown_value
@@ -82,8 +82,7 @@ def _answers(source: Source) -> list[Row]:
         ]
     rmse = campaign.rmse
     for state, error in zip(found.signals.states, rmse.tolist(), strict=True):
-        factor, shown = shown_unit(state.unit)
-        rows.append((f"error of whole flights, {words(state.name)} ({shown})", factor * error))
+        rows.append((f"error of whole flights, {labelled(state.name, state.unit)}", error))
     rows.append(("controller", "none" if best is None else controller_name(number_of(campaign, best))))
     if best is not None:
         predicted, spread = predicted_quality(best, found.experiments)

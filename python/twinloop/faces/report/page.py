@@ -15,7 +15,7 @@ from twinloop.campaign.examination.examination import Examination
 from twinloop.errors import NotAvailable
 from twinloop.faces.figures.catalogue import CAMPAIGN, CONTROLLER, FIGURES, TWIN
 from twinloop.faces.figures.figure import Figure
-from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
+from twinloop.faces.figures.style import DARK, LIGHT, RULES, SCROLL, variables
 from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.cost import cost_table
@@ -64,7 +64,7 @@ def style() -> str:
         f"@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}"
         f"@media print{{:root{{{variables(LIGHT)}}}}}"
     )
-    return themes + RULES + _source("page.css")
+    return themes + RULES + SCROLL + _source("page.css")
 
 
 def report_page(
@@ -117,7 +117,8 @@ def report_page(
             of_controller.effort(found), of_controller.envelope(found), *of_twin.closed_poles(found),
         ) if controller else [],
         campaign_tables=_present(
-            *((cost_table(result, elapsed), of_flights.flights(result)) if controller else ()), of_flights.data(found)
+            *((cost_table(result, elapsed), of_flights.flights(found, result)) if controller else ()),
+            of_flights.data(found),
         ),
         next=_next(campaign, result),
         risk=partial(risk_words, bounded=is_bounded(found.signals)),

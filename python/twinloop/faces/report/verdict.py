@@ -13,9 +13,9 @@ from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.checking import COLOURED
 from twinloop.campaign.examination.examination import Examination
-from twinloop.faces.figures.units import in_words, words
+from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
-from twinloop.faces.text.words import flown_words, quality_words
+from twinloop.faces.text.words import every, flown_words, quality_words
 
 EVIDENCE = {
     "follows": "flights",
@@ -142,7 +142,7 @@ def _unseen(found: Examination) -> str:
     if not found.unseen:
         return ""
     last = found.unseen[-1]
-    which = f"For {in_words(last.number)}, which it had not learnt from,"
+    which = f"For {found.names[last.place]}, which it had not learnt from,"
     if not np.isfinite(last.rmse).all():
         return f" {which} its free run diverged."
     fits = np.where(np.isfinite(last.fit), last.fit, np.inf)
@@ -155,7 +155,10 @@ def _unseen(found: Examination) -> str:
         else f"; {100.0 * last.inside:.0f} % of the readings were inside its 90 % band"
     )
     state = words(found.signals.state_names[worst])
-    return f" {which} the lowest FIT of its free run is {fits[worst]:.3g} %, for {state}{inside}."
+    pieces = ""
+    if last.piece < last.flown.steps:
+        pieces = f", begun again at a reading {every([last.piece * found.signals.dt])},"
+    return f" {which} the lowest FIT of its free run{pieces} is {fits[worst]:.3g} %, for {state}{inside}."
 
 
 def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:

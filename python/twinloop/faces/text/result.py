@@ -119,7 +119,7 @@ def _flights(result: Mapping[str, Any]) -> str:
 
 def _of_run(run: Mapping[str, Any]) -> str:
     if run["test"] is None:
-        return f"A run of {run['steps']} steps, attached."
+        return f"A run of {run['steps']} steps, attached{': ' + run['log'] if run.get('log') else ''}."
     return f"Test {run['test']}: {run['why'] or _own(run)}"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from twinloop._ground.texts import in_unit, two_digits
@@ -78,6 +78,19 @@ def flown_words(found: Examination) -> str:
     if found.best_flown is not None:
         return "flown"
     return "flown only with an excitation" if found.best_flights else "not flown yet"
+
+
+def every(seconds: Sequence[float]) -> str:
+    """How often free runs begin again at a reading, for a person.
+
+    Args:
+        seconds: length of each piece, s; at least one.
+
+    Returns:
+        Such as "every 1.5 s" or "every 1.5 to 3 s".
+    """
+    least, most = (two_digits(value) for value in (min(seconds), max(seconds)))
+    return f"every {least if least == most else f'{least} to {most}'} s"
 
 
 def controller_name(test: int | None) -> str:

@@ -6,22 +6,22 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop.campaign.examination.examination import Examination
-from twinloop.faces.figures.units import said, words
+from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import Table, shown_spread, table_of
 from twinloop.faces.text import counted, predicted_flights, quality_words
 from twinloop.planning.leaving import short_risk
 
 
-def flights(result: Mapping[str, Any]) -> Table:
+def flights(found: Examination, result: Mapping[str, Any]) -> Table:
     """Predicted and flown, with the reason of each."""
     rows = [
         [
-            said(run["test"]), run["predicted"], shown_spread(run.get("spread")), run["measured"],
+            name, run["predicted"], shown_spread(run.get("spread")), run["measured"],
             run.get("predicted_minus_measured"),
             short_risk(run.get("risk"), predicted_flights(result)),
             run.get("why") or ("" if run["test"] is None else "Gains of your own."),
         ]
-        for run in result["experiments"]
+        for name, run in zip(found.names, result["experiments"], strict=True)
     ]  # fmt: skip
     measure = result["quality"]
     unit = f" ({measure['unit']})" if measure["unit"] else ""
@@ -37,10 +37,10 @@ def flights(result: Mapping[str, Any]) -> Table:
 def data(found: Examination) -> Table:
     """Data quality, flight by flight."""
     rows = [
-        [said(each.number), each.seconds, each.ended,
+        [name, each.seconds, each.ended,
          None if each.moved is None else f"{each.moved:.3g} ({words(each.least)})", 100.0 * each.saturated,
          None if each.large is None else 100.0 * each.large, 100.0 * each.usage, each.fingerprint]
-        for each in found.data
+        for name, each in zip(found.names, found.data, strict=True)
     ]  # fmt: skip
     head = [
         "flight",

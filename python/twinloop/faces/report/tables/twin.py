@@ -11,7 +11,7 @@ from twinloop._ground.texts import in_unit
 from twinloop._ground.times import time_unit
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
-from twinloop.faces.figures.units import shown_unit, words
+from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import Table, shown_value, table_of
 from twinloop.faces.text.twin import STAND_IN
 
@@ -33,9 +33,9 @@ def states(result: Mapping[str, Any]) -> Table | None:
     rows = []
     per_second, late = time_unit(state["offset"] for state in twin["states"])
     for state in twin["states"]:
-        (factor, unit), error, sensor = shown_unit(state["unit"]), state["error"], state["sensor"]
+        error, sensor = state["error"], state["sensor"]
         rows.append([
-            words(state["name"]), unit, None if error is None else factor * error, factor * sensor,
+            words(state["name"]), state["unit"] or "1", error, sensor,
             error / sensor if sensor and error is not None else None,
             per_second * state["offset"],
         ])  # fmt: skip
@@ -54,9 +54,8 @@ def disturbances(result: Mapping[str, Any]) -> Table | None:
         return None
     rows = []
     for each in found:
-        factor, unit = shown_unit(each["unit"])
         rows.append([
-            words(each["name"]), unit, factor * each["white"] or None, factor * each["correlated"] or None,
+            words(each["name"]), each["unit"] or "1", each["white"] or None, each["correlated"] or None,
             each["correlation_time"] or None, CAUSES[each["cause"]] if each["correlated"] else None,
         ])  # fmt: skip
     head = [
@@ -181,17 +180,14 @@ def ranges(found: Examination) -> Table:
     """What was flown: where the twin's word holds."""
     runs = found.flown
     rows: list[list[object]] = []
-    of_states = [(state.name, *shown_unit(state.unit)) for state in found.signals.states]
-    # Commands keep their units, as in the figures: a rotor's speed is no angle.
-    of_commands = [(command.name, 1.0, command.unit or "1") for command in found.signals.commands]
+    of_states = [(state.name, state.unit) for state in found.signals.states]
+    of_commands = [(command.name, command.unit) for command in found.signals.commands]
     for signals, values in (
         (of_states, [run.states for run in runs]),
         (of_commands, [run.commands for run in runs]),
     ):
         every = np.concatenate(values)
-        for (name, factor, unit), low, high in zip(
-            signals, every.min(axis=0), every.max(axis=0), strict=True
-        ):
-            rows.append([words(name), unit, factor * float(low), factor * float(high)])
+        for (name, unit), low, high in zip(signals, every.min(axis=0), every.max(axis=0), strict=True):
+            rows.append([words(name), unit or "1", float(low), float(high)])
     note = "Over all flights together; outside it the twin extrapolates."
     return table_of("ranges", "Flown range", ["signal", "unit", "from", "to"], rows, note)
