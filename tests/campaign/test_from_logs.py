@@ -1,10 +1,13 @@
 """A twin from logs alone is the one that a campaign learns from the same runs, and it knows the plant."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import twinloop as tl
 from lives import PLANT, SIGNALS, SMALL, by_hand, made
+from twinloop.campaign.data.odd_one_out import odd_one_out
 from twinloop.campaign.from_logs import learnt_from_logs
 
 
@@ -25,6 +28,64 @@ def test_it_foretells_a_run_that_it_has_not_seen():
     moved = np.abs(other.states - other.states[0]).max()
     assert np.abs(states - other.states).max() < 0.05 * moved
     assert PLANT.signals is SIGNALS
+
+
+def motor(seed):
+    """A motor that is held at several speeds, as its driver logs it."""
+    stream, dt = np.random.default_rng(seed), 0.01
+    state, wound, states, commands = np.zeros(2), 0.0, [], []
+    for target in np.repeat(stream.uniform(-15.0, 15.0, 5), 40):
+        states.append(state + stream.normal(size=2) * [0.03, 0.02])
+        error = target - states[-1][0]
+        wound += error * dt
+        commands.append(0.5 * error + 6.0 * wound)
+        for _ in range(20):
+            speed, current = state
+            torque = 25.0 * current - 0.5 * speed - 3.0 * np.tanh(2.0 * speed)
+            state = state + dt / 20 * np.array([torque, 50.0 * (commands[-1] - 0.8 * current - 0.5 * speed)])
+    return tl.Trajectory(dt * np.arange(201), np.array([*states, state]), np.array(commands)[:, np.newaxis])
+
+
+MOTOR = tl.Signals(
+    [tl.State("speed", "rad/s", 15.0), tl.State("current", "A", 5.0)],
+    [tl.Command("voltage", "V", (-60.0, 60.0))],
+    0.01,
+)
+
+
+def remarks_on(runs, logs=()):
+    return {
+        each.code: each
+        for each in learnt_from_logs(runs, MOTOR, logs=logs, options=SMALL, threads=1)[0].remarks
+    }
+
+
+@pytest.mark.filterwarnings("ignore::twinloop.errors.RemarkWarning")
+def test_the_one_log_with_a_wrong_sign_is_named_instead_of_the_wind():
+    runs = [motor(seed) for seed in range(3)]
+    assert "odd-one-out" not in remarks_on(runs)
+    runs[1] = dataclasses.replace(runs[1], commands=-runs[1].commands)
+    found = remarks_on(runs, ["mon.csv", "tue.csv", "wed.csv"])
+    assert found["odd-one-out"].serious
+    assert found["odd-one-out"].sentence.startswith("Without tue.csv one law explains the other 2 flights.")
+    assert "with the sign of its voltage changed" in found["odd-one-out"].sentence
+    assert not any("wind" in each.sentence for each in found.values())
+
+
+@pytest.mark.filterwarnings("ignore::twinloop.errors.RemarkWarning")
+def test_where_a_law_explains_all_logs_none_is_accused_though_no_linear_law_does():
+    """A heater takes its voltage squared: to a linear law the log below 0 has the other sign."""
+    heater = tl.Signals([tl.State("heat", "K", 3.0)], [tl.Command("voltage", "V", (-2.0, 2.0))], 0.05)
+    runs = []
+    for seed, sign in enumerate((1.0, 1.0, -1.0)):
+        commands = sign * np.repeat(np.random.default_rng(seed).uniform(0.3, 1.5, (10, 1)), 15, axis=0)
+        heat = [0.0]
+        for (u,) in commands:
+            heat.append(heat[-1] + 0.05 * (3.0 * u * u - heat[-1]))
+        runs.append(tl.Trajectory(0.05 * np.arange(151), np.array(heat)[:, np.newaxis], commands))
+    assert len(list(odd_one_out(runs, ["0.csv", "1.csv", "2.csv"], heater))) == 1
+    twin = tl.identify(runs, heater, options=SMALL, threads=1)
+    assert twin.follows and "odd-one-out" not in [each.code for each in twin.remarks]
 
 
 def test_an_envelope_that_does_not_hold_zero_is_no_hindrance():

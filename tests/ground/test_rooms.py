@@ -21,7 +21,7 @@ FRONTS = {
         "assessment campaign_file certificate cost excited from_logs history keeping presets provenance remaining setup"
     ),
     "campaign/coevolution": "method search",
-    "campaign/data": "begun declared gains lateness levels readings reports rows sent wrapped",
+    "campaign/data": "begun declared gains lateness levels odd_one_out readings reports rows sent wrapped",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "reaching rivals steps unseen use"

@@ -417,6 +417,13 @@ def test_each_constant_has_the_standard_deviation_of_its_term_over_the_committee
     assert any("0.25*x" in line and line.endswith("# (1 of 3)") for line in alone.splitlines())
 
 
+def test_a_committee_of_copies_says_nothing_of_how_far_constants_are_off():
+    members = [member(-0.5, lag=0.05, inside=2.0) for _ in range(8)]
+    text = equations(members[0], members)
+    assert "±" not in text and "committee" not in text
+    assert text == equations(members[0])
+
+
 def test_constants_inside_functions_and_lags_have_theirs():
     insides, lags = [2.0, 2.1, 1.9, 2.05], [0.05, 0.06, 0.055, 0.05]
     members = [member(-0.5, lag, inside) for lag, inside in zip(lags, insides, strict=True)]

@@ -51,7 +51,8 @@ class Equations:
 
     Args:
         law: to be written.
-        members: of the committee; behind each constant stands its standard deviation over those that have its term.
+        members: of the committee; behind each constant stands its standard deviation over those that have its term, if
+            they differ at all.
         digits: significant digits of constants; 17 give every bit back, as the program computes it and without ±.
         flown: how far the flights went that it was learnt from.
 
@@ -66,7 +67,8 @@ class Equations:
             raise InvalidInput(f"Equations, digits: expected 1 to 17, found {digits}; 17 are exact.")
         self.law, self.signals, self.flown = law, law.signals, flown
         self.exact = digits == EXACT
-        self.members = () if self.exact else tuple(members)
+        # Copies of one law know nothing of how far its constants are off: "± 0" would promise that they are exact.
+        self.members = () if self.exact or _all_alike(members) else tuple(members)
         self.expressions = law.expressions if self.exact else Expressions()
 
         def expanded(each: Law) -> list[Polynomial]:
@@ -375,6 +377,12 @@ def readable(expressions: Expressions, number: int, symbols: Sequence[str], digi
     root = written(target, Expansion(expressions, target)[number])
     endless = replace(TEXT, longest=sys.maxsize, worth=sys.maxsize)
     return Writer(target, [root], symbols, digits, "t", False, endless).text(root)
+
+
+def _all_alike(members: Sequence[Law]) -> bool:
+    """Whether there are several members, and all of them are the same law."""
+    laws = [(each.expressions.nodes, each.outputs, each.actuation, each.offsets) for each in members]
+    return len(laws) > 1 and all(law == laws[0] for law in laws)
 
 
 def _steps(signals: Signals) -> str:

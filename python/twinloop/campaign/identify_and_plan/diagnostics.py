@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
+from twinloop.campaign.data.odd_one_out import odd_one_out
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.rows import Late
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
-from twinloop.campaign.history import Experiment
+from twinloop.campaign.history import Experiment, called
 from twinloop.campaign.identify_and_plan.elsewhere import NOWHERE, Elsewhere
 from twinloop.campaign.identify_and_plan.misses import FREE_RUN, Miss
 from twinloop.campaign.identify_and_plan.selection import distinct
@@ -42,6 +43,7 @@ class Findings:
         pieces: steps of those in which each flight is followed; empty: all in whole.
         disturbed: states with disturbances that would take free runs of a right twin as far; empty: none would.
         elsewhere: under how many controllers what is learnt is still open.
+        explained: whether a law explains the flights.
     """
 
     follows: bool
@@ -55,6 +57,7 @@ class Findings:
     pieces: Sequence[int] = ()
     disturbed: Sequence[str] = ()
     elsewhere: Elsewhere = NOWHERE
+    explained: bool = True
 
 
 def diagnostics_of(
@@ -76,8 +79,10 @@ def diagnostics_of(
         signals,
         lambda k, row: f"in run {k + 1} of {len(experiments)} at {experiments[k].trajectory.t[row]:g} s",
     )
+    odd = () if found.explained else odd_one_out(recorded, called(experiments), signals)
     said = [
         *wrapped,
+        *odd,
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
         *from_other_controllers(found.others),

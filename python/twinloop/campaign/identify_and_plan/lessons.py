@@ -124,4 +124,5 @@ def findings(
         pieces=pieces,
         disturbed=[names[gust.states[0]] for gust in gusts],
         elsewhere=elsewhere(answer.believed, before, setup, Unit(setup.seed).part(len(flights), 4), workers),
+        explained=answer.explained,
     )
