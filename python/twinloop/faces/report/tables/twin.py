@@ -133,9 +133,7 @@ def poles(found: Examination, tuned: bool) -> list[Table]:
         title = "Poles of the twin in the middle of the envelope"
         point = zip(found.signals.states, found.setup.final_target.tolist(), strict=True)
         values = ", ".join(
-            f"{words(state.name)} {in_unit(f'{factor * value:.4g}', unit)}"
-            for state, value in point
-            for factor, unit in [shown_unit(state.unit)]
+            f"{words(state.name)} {in_unit(f'{value:.4g}', state.unit)}" for state, value in point
         )
         note += f" At {values}: logs have no target, and where no envelope is declared the middle is 0."
     return _sticking_and_sliding("poles", title, found.open_poles, found.sliding_open_poles, note)
