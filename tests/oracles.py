@@ -90,6 +90,24 @@ def rk4(derivative, state, dt):
     return state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
+FINE = 40
+"""Steps of `solved` in a period: of periods of a fiftieth of a motion they are exact to rounding."""
+
+
+def solved(slope, start, times):
+    """A solution at times (n, n_x), to rounding, with the same bits on any processor: SciPy has those of its BLAS.
+
+    What is learnt of exact readings hangs on their last bits.
+    """
+    states, dt = [np.array(start, dtype=np.float64)], (times[1] - times[0]) / FINE
+    for _ in times[1:]:
+        state = states[-1]
+        for _ in range(FINE):
+            state = rk4(lambda x: np.array(slope(*x.tolist())), state, dt)
+        states.append(state)
+    return np.array(states)
+
+
 def model_step(program, form, state, command, scales, derivative_of, dt):
     """Next state under a program of any form."""
     state = np.asarray(state, dtype=float)

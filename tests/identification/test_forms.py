@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 import twinloop as tl
 from late_sensors import BODY, PENDULUM, read, swinging, turning
 from late_sensors import DT as LATE_DT
+from oracles import solved
 from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
@@ -229,16 +230,7 @@ def test_a_form_of_the_options_is_the_form(form):
 
 def test_a_disturbance_that_explains_all_hides_no_form():
     # A cubic law, whose terms stand on the last rung: under a lasting disturbance that explains all they gain nothing.
-    t = DT * np.arange(150)
-    states = solve_ivp(
-        lambda _, x: 0.3 * x * x - 0.2 * x - 0.1 * x * x * x,
-        (0.0, t[-1]),
-        [1.4],
-        "DOP853",
-        t,
-        rtol=1e-13,
-        atol=1e-13,
-    ).y.T
+    states = solved(lambda x: [0.3 * x * x - 0.2 * x - 0.1 * x * x * x], [1.4], DT * np.arange(150))
     signals = tl.Signals([tl.State("x", "1", 1.4)], [tl.Command("idle", "1", (0.0, 1.0))], DT)
     found = identified(Run.of(states, np.zeros((149, 1))), signals)
     assert found.model.form == "acceleration"

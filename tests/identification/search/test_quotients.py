@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import twinloop as tl
+from oracles import solved
 from problems import problem_of as one_run
 from twinloop import _core
 from twinloop._ground.slopes import slopes
@@ -34,9 +34,7 @@ STEPS = 150
 def flown(slope, start, length, noise=0.0, seed=0):
     """Readings of an autonomous law, integrated to rounding by somebody else."""
     times = np.linspace(0.0, length, STEPS)
-    states = solve_ivp(
-        lambda t, x: slope(*x), times[[0, -1]], start, "DOP853", times, rtol=1e-13, atol=1e-13
-    ).y.T
+    states = solved(slope, start, times)
     return states + noise * states.std(axis=0) * np.random.default_rng(seed).standard_normal(states.shape)
 
 
@@ -191,11 +189,11 @@ def inhibited(s, p):
 
 def test_two_chains_pay_together_for_a_denominator_that_is_too_dear_for_each():
     signals = signals_of("sp", 5.0)
-    problem, both = problem_of(flown(inhibited, (1.6, 0.5), 5.0, noise=0.01), signals)
+    problem, both = problem_of(flown(inhibited, (1.6, 0.5), 5.0, noise=0.01, seed=7), signals)
     pool = problem.pool
     terms = [pool.one, 0, 1, pool.product(0, 0), pool.product(1, 1), pool.product(0, 1)]
     problem.usable(terms)
-    walks = Walks(12_500, 16, Unit(0, (1,)))
+    walks = Walks(12_500, 16, Unit(1, (1,)))
     known = search(problem, both, terms, [None, None], walks)
     found = with_quotients(problem, signals, known, (), walks)
     (shared,) = denominators(pool, [term for sum_ in found for term in sum_.weights])
