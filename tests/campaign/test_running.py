@@ -8,6 +8,7 @@ import pytest
 import twinloop as tl
 from conftest import PENDULUM_GAINS
 from lives import CONTROLLER, SMALL
+from twinloop.campaign.rescue import rescued
 from twinloop.logs.files import read_log
 
 
@@ -166,3 +167,31 @@ def test_a_flight_that_no_store_takes_is_written_to_a_file_which_can_be_told(
     campaign.tell(test, log.trajectory())
     (run,) = campaign.experiments
     assert run.complete and run.trajectory.steps == test.steps
+
+
+def test_what_is_rescued_has_the_columns_that_were_measured_and_says_how_it_ended(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    states = [tl.State("x", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="x", measured=False)]
+    signals = tl.Signals(states, [tl.Command("u", "N", (-1.0, 1.0))], 0.1)
+    family = tl.controllers.StateFeedback(None, (-1.0, 1.0)).bind(signals)
+    test = tl.Test(family, np.zeros(family.size), np.zeros(2), np.zeros(2), 5)
+    run = tl.Trajectory(0.1 * np.arange(4), np.arange(4.0)[:, None], np.zeros((3, 1)), "aborted", "it fell")
+    assert "It ended early (aborted): it fell" in rescued(test, run) and "-1.csv" in rescued(test, run)
+    assert (tmp_path / f"flight-of-test-{test.number}.csv").read_text().startswith("t,x,u\n0.0,0.0,0.0\n")
+    # Where nobody may write here it is among the temporary files.
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(elsewhere))
+    monkeypatch.setattr("twinloop.campaign.rescue._free", _only_in(elsewhere))
+    assert str(elsewhere) in rescued(test, run)
+
+
+def _only_in(folder):
+    """A place for a file where it may be written, and none anywhere else."""
+
+    def free(where, name):
+        if where != folder.resolve():
+            raise PermissionError
+        return where / f"{name}.csv"
+
+    return free

@@ -7,7 +7,7 @@ import twinloop as tl
 from twinloop.errors import RemarkWarning
 from twinloop.logs.missing import filled
 
-STATES = [tl.State("x", "m", 1.0), tl.State("yaw", "deg", 180.0)]
+STATES = [tl.State("x", "m", 1.0), tl.State("yaw", "deg", 180.0, periodic=360.0)]
 SIGNALS = tl.Signals(STATES, [tl.Command("u", "N", (-1.0, 1.0))], dt=0.1)
 
 
@@ -36,6 +36,18 @@ def test_a_single_one_is_filled_in_and_counted_by_its_state():
     assert "2 of x and 1 of yaw: each is taken half-way" in remark.sentence and not remark.serious
     there = np.isfinite(without([(7, 0), (9, 0), (18, 1)]))
     assert (found[there] == readings()[there]).all()
+
+
+def test_where_an_angle_may_have_wrapped_and_nobody_says_so_nothing_is_made_up():
+    undeclared = [STATES[0], tl.State("yaw", "deg", 180.0)]
+    holes = without([(18, 1)])
+    found, remarks = filled(holes, undeclared)
+    assert remarks == () and np.isnan(found[18, 1])
+    # Half a turn and more between two readings of a wheel's angle is no jump that is known.
+    wheel = np.column_stack([3.0 * np.arange(60)])
+    wheel[30] = np.nan
+    assert filled(wheel, [tl.State("turned", "1", 100.0)])[0][30] == pytest.approx(90.0)
+    assert np.isnan(filled(wheel, [tl.State("turned", "rad", 100.0)])[0][30]).all()
 
 
 @pytest.mark.parametrize("rows", [[7, 8], [0], [59], [5, 9, 13, 17], [20, 21, 30]])

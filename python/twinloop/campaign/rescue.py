@@ -10,6 +10,7 @@ from pathlib import Path
 from twinloop.logs import write_columns
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+from twinloop.unmeasured import names_of
 
 
 def rescued(test: Test, trajectory: Trajectory) -> str:
@@ -22,15 +23,24 @@ def rescued(test: Test, trajectory: Trajectory) -> str:
     Returns:
         A sentence that says where it is.
     """
-    signals = test.signals
+    signals, number = test.signals, test.number
     columns = {"t": trajectory.t}
-    columns |= dict(zip(signals.state_names, trajectory.states.T, strict=True))
+    columns |= dict(zip(names_of(trajectory.states, signals), trajectory.states.T, strict=True))
     columns |= dict(zip(signals.command_names, trajectory.commands.T, strict=True))
-    for folder in (Path.cwd(), Path(tempfile.gettempdir())):
-        name = f"flight-of-test-{test.number}"
-        places = (folder / (f"{name}-{again}.csv" if again else f"{name}.csv") for again in count())
-        path = next(place for place in places if not place.exists())
+    ended = (
+        ""
+        if trajectory.ended == "completed"
+        else f" It ended early ({trajectory.ended}): {trajectory.reason}"
+    )
+    for folder in (Path, tempfile.gettempdir):
         with suppress(OSError):
+            path = _free(Path(folder()).resolve(), f"flight-of-test-{number}")
             write_columns(path, columns)
-            return f"The flight of test {test.number} is in {path}: tell it instead of flying again."
-    return f"The flight of test {test.number} could not be written to a file either."
+            return f"The flight of test {number} is in {path}: tell it instead of flying again.{ended}"
+    return f"The flight of test {number} could not be written to a file either."
+
+
+def _free(folder: Path, name: str) -> Path:
+    """A file that is not there yet."""
+    places = (folder / (f"{name}-{again}.csv" if again else f"{name}.csv") for again in count())
+    return next(place for place in places if not place.exists())

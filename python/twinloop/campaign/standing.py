@@ -158,8 +158,8 @@ def borne(book: Logbook) -> int:
         if test.hold_back is None or not _told(book, test.number):
             continue
         runs = _runs(book, test.number)
-        flown = [run.test is None or run.test.excitation is not None for run in runs]
-        if test.excitation is not None and runs and not any(flown):
+        excited = any(run.test is not None and run.test.excitation is not None for run in runs)
+        if test.excitation is not None and runs and not excited:
             continue
         went_on = max((test.hold_back.overrun(signals, run.trajectory.states) for run in runs), default=0.0)
         if not flies(book, test.number) or went_on >= HELD:

@@ -67,8 +67,8 @@ def as_it_counts(run: Experiment, place: int, book: Logbook) -> Experiment:
     late = test is not None and any(late_commands(test, run.trajectory))
     if test is not None and not late and setup.preset != "paper":
         # Tests that surely had been made when the run was told: what it counts for must not change with later ones.
-        made = max(told.number for told in [*book.recorded[:place], run] if told.number is not None)
-        otherwise = flown_otherwise(test, run.trajectory, setup.controller, book.tests[:made])
+        latest = max(told.number for told in [*book.recorded[:place], run] if told.number is not None)
+        otherwise = flown_otherwise(test, run.trajectory, setup.controller, book.tests[: latest + 1])
         if otherwise is not None:
             return replace(run, replayed=otherwise, before=None, final_distance=None, quality=None)
     if test is not None:

@@ -18,8 +18,8 @@ SHARE = 0.05
 def filled(readings: Floats, states: Sequence[State]) -> tuple[Floats, tuple[Remark, ...]]:
     """Readings with single missing ones filled in, and a remark that says how many.
 
-    As between two samples of a `.ulg`, a reading may be missing between two others, not two in a row. An angle takes
-    the short way.
+    As between two samples of a `.ulg`, a reading may be missing between two others, not two in a row. An angle that
+    wraps takes the short way; one of which that is not declared is left as it is where it may have wrapped.
 
     Args:
         readings: a column for each state (n + 1, columns), NaN where there is none.
@@ -36,9 +36,10 @@ def filled(readings: Floats, states: Sequence[State]) -> tuple[Floats, tuple[Rem
         if not 0 < len(single) == missing.sum() <= SHARE * len(column):
             continue
         change = column[single + 1] - column[single - 1]
-        turn = state.period or TURNS.get(state.unit)
-        if turn is not None:
-            change -= np.rint(change / turn) * turn
+        if state.period is not None:
+            change -= np.rint(change / state.period) * state.period
+        elif (np.abs(change) > 0.5 * TURNS.get(state.unit, np.inf)).any():
+            continue
         column[single] = column[single - 1] + 0.5 * change
         counts[state.name] = len(single)
     return (found, (_said(counts),)) if counts else (readings, ())

@@ -107,3 +107,12 @@ def test_once_it_is_withdrawn_and_told_as_what_it_is_nothing_is_said():
     campaign.tell(second, flown(second))
     assert all(run.quality is not None for run in campaign.experiments)
     assert "other-test" not in {remark.code for remark in campaign.twin.remarks}
+
+
+def test_the_latest_test_that_was_told_is_among_those_that_may_have_been_flown():
+    campaign = new_campaign()
+    tests = [campaign.test(gains) for gains in (GAINS, OTHERS)]
+    campaign.tell(tests[1], flown(tests[1]))
+    with pytest.warns(RemarkWarning, match="flight of test 1"):
+        campaign.tell(tests[0], flown(tests[1], seed=1))
+    assert campaign.experiments[1].quality is None

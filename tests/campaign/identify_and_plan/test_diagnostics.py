@@ -37,7 +37,9 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False, commands
     trajectory = tl.Trajectory(
         t, change(states), 0.1 * np.sin(5.0 * t[:-1, None]) if commands is None else commands
     )
-    return SimpleNamespace(trajectory=trajectory, complete=not cut, test=None, off_start=())
+    return SimpleNamespace(
+        trajectory=trajectory, complete=not cut, test=None, off_start=(), attached=True, log="", number=None
+    )
 
 
 def said(*runs, follows=True):

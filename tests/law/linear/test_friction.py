@@ -115,6 +115,12 @@ def test_what_saturates_an_angle_or_a_command_is_no_friction(of):
     assert not has_friction(law) and sliding(law, np.zeros(2)) is law
 
 
+@pytest.mark.parametrize(("wide", "rubs"), [(0.1, False), (20.0, True)])
+def test_only_a_steep_tanh_of_a_speed_is_dry_friction(wide, rubs):
+    law = twin_of([f"r5 = r1 * {wide!r}", "r4 = tanh(r5)"]).law
+    assert has_friction(law) is rubs
+
+
 def test_a_difference_of_speeds_rubs_and_a_law_keeps_all_else():
     signals = tl.Signals(
         states=[tl.State(name, "m/s", 1.0) for name in ("v", "w")],

@@ -110,9 +110,9 @@ def from_first_readings(flight: Experiment) -> Iterator[Remark]:
         yield serious(
             "first-reading",
             f"{state.name} is {in_unit(f'{first:.4g}', state.unit)} in the first row and"
-            f" {in_unit(f'{second:.4g}', state.unit)} in the second, near where test {flight.test.number} begins. Free"
-            " runs begin at the first: if its sensor was not ready, withdraw the flight, write the true state into the"
-            " first row, and tell it again.",
+            f" {in_unit(f'{second:.4g}', state.unit)} in the second, near where test {flight.test.number} begins."
+            " Either it began elsewhere, or its sensor was not ready. Free runs begin at the first row: in the second"
+            " case withdraw the flight, write the true state into the first row, and tell it again.",
         )
 
 

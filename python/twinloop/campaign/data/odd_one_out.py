@@ -8,6 +8,7 @@ a column has the other sign or another unit, or two columns are exchanged.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations
@@ -23,7 +24,7 @@ from twinloop.trajectory import Trajectory
 WINDOWS = (1, 3, 10, 30)
 """Periods over which moves are predicted: long ones see less of the sensors' noise, short ones see what is fast."""
 AGREEING = 2
-"""Windows that must name the flight, while none names another one."""
+"""Windows that must name the flight and the same change, while none names another flight."""
 EXPLAINED = 0.25
 """Of a state's moves, mean squares, that the law may leave of each of the other flights."""
 MISSED = 0.75
@@ -32,6 +33,8 @@ TIMES = 10.0
 """By which the change lessens that."""
 NEARLY = 0.1
 """Of its moves that the law may leave after the change, or twice as much as of the others."""
+EXACTLY = 0.01
+"""The same after a change of a unit: other loads and speeds have other slopes, by any factor, and 3.6 is near many."""
 MATTERS = 4.0
 """Times that more is left without what was changed: dividing a column by 1000 must not only silence it."""
 MOST = 2000
@@ -54,6 +57,7 @@ class _Change:
 
     Args:
         words: what makes it right.
+        nearly: of the flight's moves that a law may leave after it.
         scaled: columns that are divided; none where two are exchanged.
         order: where each row of `Squares` has stood.
         factors: by which it is divided then.
@@ -61,6 +65,7 @@ class _Change:
     """
 
     words: str
+    nearly: float
     scaled: tuple[int, ...]
     order: Integers
     factors: Floats
@@ -113,14 +118,16 @@ def odd_one_out(flights: Sequence[Trajectory], names: Sequence[str], signals: Si
     changes = list(_changes(signals))
     squares = ([_squares(flights[place], window) for place in kept] for window in WINDOWS)
     found = [suspect for of_window in squares for suspect in _suspects(of_window, changes, signals.n_x)]
-    named = [suspect.change for suspect in found if suspect.change is not None]
-    if len(named) < AGREEING or len({suspect.place for suspect in found}) > 1:
+    named = Counter(suspect.change.words for suspect in found if suspect.change is not None)
+    words, windows = next(iter(named.most_common(1)), ("", 0))
+    if windows < AGREEING or len({suspect.place for suspect in found}) > 1:
         return
     name = names[kept[found[0].place]]
     yield serious(
         "odd-one-out",
-        f"Without {name} one law explains the other {len(kept) - 1} flights. {name} contradicts it, and follows it"
-        f" {named[0].words}: check the signs, units and order of its columns.",
+        f"Without {name} one linear law explains most of the other {len(kept) - 1} flights that were compared. It"
+        f" does not explain {name}, but would {words}: check the signs, units and order of its columns, and whether"
+        " it was flown as the others were (load, speed, direction).",
     )
 
 
@@ -191,7 +198,7 @@ def _suspects(flights: Sequence[Squares], changes: Sequence[_Change], n_x: int) 
         right = []
         for change in changes:
             after = _left(change.made(flight), law)
-            agrees = (after <= np.maximum(2.0 * usual, NEARLY))[explained].all()
+            agrees = (after <= np.maximum(2.0 * usual, change.nearly))[explained].all()
             healed = (TIMES * after <= before)[missed].any()
             if agrees and healed and change.matters(flight, law, explained):
                 right.append((len(change.scaled) > 1, float(after[explained].max()), change))
@@ -216,13 +223,16 @@ def _changes(signals: Signals) -> Iterator[_Change]:
             causes = [1 + place for place in scaled]
             factors[[*causes, *(1 + count + place for place in scaled if place < n_x)]] = factor
             gone[causes] = np.inf
-            yield _Change(words, scaled, np.arange(len(factors)), factors, factors * gone)
+            nearly = NEARLY if factor < 0.0 else EXACTLY
+            yield _Change(words, nearly, scaled, np.arange(len(factors)), factors, factors * gone)
     for pair in chain(combinations(range(n_x), 2), combinations(range(n_x, count), 2)):
         columns = np.arange(count)
         columns[list(pair)] = pair[::-1]
         order = np.concatenate([[0], 1 + columns, 1 + count + columns[:n_x]])
         none = np.ones(len(order))
-        yield _Change(f"with its {names[pair[0]]} and {names[pair[1]]} exchanged", (), order, none, none)
+        yield _Change(
+            f"with its {names[pair[0]]} and {names[pair[1]]} exchanged", NEARLY, (), order, none, none
+        )
 
 
 def _with_derivatives(signals: Signals) -> list[tuple[int, ...]]:

@@ -23,6 +23,8 @@ NEARER = 100.0
 """Times nearer to the controller's, in squares, that commands have to be in other rows."""
 FEWEST = 20
 """Rows at least that are compared."""
+FEW = 5
+"""Of these at least that have to be off as they stand: a command that changes once tells nothing of its rows."""
 
 
 class Late(NamedTuple):
@@ -61,7 +63,10 @@ def late_commands(test: Test, run: Trajectory) -> tuple[int, ...]:
         # In the same rows: one that is off by itself is out of both.
         used = slice(shift, None) if shift > 0 else slice(None, shift)
         off = np.min([_off(sent[used], each[used], 0) for each in asked], axis=0)
-        better = (off > SEEN * SEEN) & (NEARER * left <= off) & (left < least)
+        several = (
+            np.min([(np.abs(sent[used] - each[used]) > SEEN).sum(axis=0) for each in asked], axis=0) >= FEW
+        )
+        better = several & (off > SEEN * SEEN) & (NEARER * left <= off) & (left < least)
         late[better], least[better] = shift, left[better]
     return tuple(late.tolist())
 

@@ -157,11 +157,16 @@ def _delay(worst: LoopMargins, dt: float, flown: int, bounded: bool) -> Check:
         else "No delay makes any loop unstable"
     )
     keeps = "stays in the envelope" if bounded else "does not diverge"
+    flight = (
+        f"the flight of the task {keeps} with up to {flown} periods more, of {MOST} that were tried, on each model that"
+        " flies it at all"
+        if flown
+        else "the flight of the task bears not one period more"
+    )
     found = min(periods, float(flown))
     return Check(
         "delay", "controller", found, PERIODS, found >= PERIODS, True,
-        f"{borne}; the flight of the task {keeps} on any model with up to {flown} periods more, of {MOST} that were"
-        f" tried. At least {PERIODS:g} is required of both, since a command may be that late.",
+        f"{borne}; {flight}. At least {PERIODS:g} is required of both, since a command may be that late.",
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ def periods_borne(models: Sequence[_core.Model], test: Test, limits: Limits, mos
         most: periods that are tried.
 
     Returns:
-        The most periods, as many of which as are fewer are borne, too; 0 if none is.
+        The largest number up to which every number of periods is borne; 0 if one is not.
     """
 
     def borne(model: _core.Model) -> bool:

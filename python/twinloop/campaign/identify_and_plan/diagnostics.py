@@ -19,6 +19,7 @@ from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.campaign.identify_and_plan.track_record import NEARLY, missed_in_a_row
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
 
 MANY = 0.25
 """Share of the drawn controllers under which laws part, above which it is said."""
@@ -79,7 +80,7 @@ def diagnostics_of(
         signals,
         lambda k, row: f"in run {k + 1} of {len(experiments)} at {experiments[k].trajectory.t[row]:g} s",
     )
-    odd = () if found.explained else odd_one_out(recorded, called(experiments), signals)
+    odd = () if found.explained and not found.misses else _odd_log(experiments, recorded, signals)
     said = [
         *wrapped,
         *odd,
@@ -97,6 +98,16 @@ def diagnostics_of(
         said += _elsewhere(found.elsewhere)
     said += [*_model_error(found.recurring), *_copies(experiments), *_none_complete(experiments, steps)]
     return [*said, *_missed_predictions(experiments)]
+
+
+def _odd_log(
+    experiments: Sequence[Experiment], recorded: Sequence[Trajectory], signals: Signals
+) -> Iterator[Remark]:
+    """The one log that contradicts all others. Of a test its own controller shows what is wrong with its columns."""
+    logs = [place for place, run in enumerate(experiments) if run.attached]
+    if logs:
+        names = called(experiments)
+        yield from odd_one_out([recorded[place] for place in logs], [names[place] for place in logs], signals)
 
 
 def _unmoved(states: Sequence[str]) -> Iterator[Remark]:

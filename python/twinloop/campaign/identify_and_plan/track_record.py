@@ -149,9 +149,8 @@ def _came_true(run: Experiment, share: float) -> bool:
     test = run.test
     if test is None or test.predicted is None or test.spread is None or run.quality is None:
         return False
-    if not np.isfinite(
-        test.predicted
-    ):  # that it diverges is no quality, and comes true in no flight that has one
+    # That a flight diverges is no quality, and comes true in none that has one.
+    if not np.isfinite(test.predicted):
         return False
     spread = held_to(test.predicted, test.spread)
     return bool(abs(test.predicted - run.quality) <= max(SURE * spread, share * run.quality))

@@ -202,6 +202,7 @@ class Pages:
         campaign, may = self.desk.look(name), self.desk.approved(name)
         units = {gain.name: gain.unit for gain in campaign.family.law_gains}
         bounded = is_bounded(campaign.signals)
+        advice = advised_to_stop(campaign) if to_be_flown(campaign) else None
         return {
             "experiments": len(campaign.experiments),
             "unlearnt": unlearnt(campaign),
@@ -219,7 +220,7 @@ class Pages:
                     if test.risk is None
                     else risk_words(test.risk, campaign.setup.predicted_flights, bounded),
                     "risk_of": risk_of_what(bounded),
-                    "advice": advised_to_stop(campaign),
+                    "advice": advice,
                     "reason": test.reason,
                     "approved": may.get(test.number) if test.number is not None else None,
                 }

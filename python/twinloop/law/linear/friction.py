@@ -17,6 +17,9 @@ from twinloop.law.law import Law
 from twinloop.law.linear.jacobian import jacobian
 from twinloop.signals import rates
 
+STEEP = 5.0
+"""Slope at rest, over a speed's scale, from which a tanh is dry friction: it is all there at a fifth of the scale."""
+
 
 def has_friction(law: Law) -> bool:
     """Whether a law has dry friction.
@@ -55,7 +58,7 @@ def sliding(law: Law, state: Floats) -> Law:
 
 
 def _frictions(law: Law) -> list[int]:
-    """Nodes of dry friction: tanh of speeds alone. Where no rates are declared every state may be a speed."""
+    """Nodes of dry friction: steep tanh of speeds alone. Where no rates are declared every state may be a speed."""
     speeds = rates(law.signals) or set(range(law.signals.n_x))
     moved_by: dict[int, set[int]] = {}
     found = []
@@ -65,4 +68,10 @@ def _frictions(law: Law) -> list[int]:
         moved_by[number] = {int(value)} if operation == INPUT else set().union(*given)
         if operation == "tanh" and moved_by[number] and moved_by[number] <= speeds:
             found.append(number)
-    return found
+    scales = np.array([state.scale for state in law.signals.states])
+    slopes = np.abs(jacobian(law.expressions, found, np.zeros(law.inputs))[1][:, : len(scales)] * scales)
+    return [
+        number
+        for number, steepest in zip(found, slopes.max(axis=1, initial=0.0), strict=True)
+        if steepest >= STEEP
+    ]
