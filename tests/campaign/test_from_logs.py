@@ -122,3 +122,10 @@ def test_a_run_that_is_learnt_is_not_held_out():
 def test_what_is_no_list_of_runs_is_refused(runs, found):
     with pytest.raises(tl.InvalidInput, match=f"at least one Trajectory.*found {found}"):
         tl.identify(runs, SIGNALS)
+
+
+@pytest.mark.parametrize("names", [["a.csv"], ["a.csv", "b.csv", "c.csv"]])
+def test_names_are_of_all_runs_or_of_none(names):
+    runs = [motor(0), motor(1)]
+    with pytest.raises(tl.InvalidInput, match=f"as many names as runs, 2, found {len(names)}"):
+        learnt_from_logs(runs, MOTOR, logs=names)

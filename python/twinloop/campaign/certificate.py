@@ -125,7 +125,7 @@ def certificate(campaign: Campaign) -> Certificate:
 
 def _uses(found: Examination, step: Trajectory) -> tuple[Use, ...]:
     low, high = (step.states, step.states) if step.band is None else step.band
-    sensors = np.zeros(found.signals.n_x) if found.twin.noise is None else found.twin.noise.sensors
+    sensors = np.zeros(found.signals.n_x) if found.sensors is None else found.sensors
     uses = []
     for i, state in enumerate(found.signals.states):
         flown = [run.states[:, i] for run in found.flown]

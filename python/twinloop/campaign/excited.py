@@ -21,7 +21,9 @@ BETTER = 0.25
 late is never further off than this: |e(t - d) - e(t)|² is at most 4 |e|² on average, whatever the delay."""
 SEEN = 0.005
 """Share of their bounds by which commands are off at least before another excitation is looked for."""
-
+NEARER = 100.0
+"""Times nearer to those of a controller, in squares, that recorded commands are once the fault of a log is put right:
+they follow from its readings almost exactly."""
 AT_BOUND = 1e-9
 """Share of their bounds within which commands are at one."""
 
@@ -44,11 +46,11 @@ def excited(test: Test, run: Trajectory) -> Excited:
     """
     if test.excitation is None:
         return Excited.HELD_BACK
-    asked = _off(test, run)
+    asked = off_from(test, run)
     if asked <= SEEN * SEEN:
         return Excited.HELD_BACK
     others = (Excited.WHOLE, Excited.NOT, Excited.TWICE)
-    off = {how: _off(as_excited(test, how), run) for how in others}
+    off = {how: off_from(as_excited(test, how), run) for how in others}
     best = min(off, key=lambda how: off[how])
     return best if off[best] < BETTER * asked else Excited.HELD_BACK
 
@@ -109,6 +111,16 @@ def given(test: Test, states: Floats) -> Floats:
     return test.controller().commands(states[:-1], targets)
 
 
+def given_in_spans(test: Test, states: Floats) -> Floats:
+    """The same in units of the commands' spans (n, n_u).
+
+    Args:
+        test: that was flown.
+        states: that were read (n + 1, n_x).
+    """
+    return given(test, states) / span_of(test)
+
+
 def apart(sent: Floats, asked: Floats, test: Test) -> Floats:
     """Mean squares of what commands (n, n_u) are off from others, in units of their spans (n_u,).
 
@@ -120,8 +132,13 @@ def apart(sent: Floats, asked: Floats, test: Test) -> Floats:
     return np.asarray(np.square((sent - asked) / span_of(test)).mean(axis=0))
 
 
-def _off(test: Test, run: Trajectory) -> float:
-    """How far recorded commands are from those of a test, mean square over all of them."""
+def off_from(test: Test, run: Trajectory) -> float:
+    """How far recorded commands are from those of a test, mean square over all of them, in units of their spans.
+
+    Args:
+        test: as it may have been flown.
+        run: that was recorded.
+    """
     return float(apart(run.commands, given(test, run.states), test).mean())
 
 

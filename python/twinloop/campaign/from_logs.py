@@ -77,6 +77,12 @@ def learnt_from_logs(
             "identify: expected runs to hold out that are not learnt, found one that is, equal to the last digit; leave"
             " it out of one of the two."
         )
+    names = list(logs) or [""] * (len(found) + len(apart))
+    if len(names) != len(found) + len(apart):
+        raise InvalidInput(
+            f"identify, logs: expected as many names as runs, {len(found) + len(apart)}, found {len(names)}; name"
+            " those that are held out behind the others, or none."
+        )
     # A campaign has a task and a controller; neither is used here, so both are what any system has.
     rest = [0.0 if state.envelope is None else sum(state.envelope) / 2.0 for state in signals.states]
     campaign = Campaign(
@@ -90,12 +96,11 @@ def learnt_from_logs(
         threads=threads,
         progress=progress,
     )
-    names = iter(logs or [""] * (len(found) + len(apart)))
-    for run in found:
-        campaign.attach(run, next(names))
+    for run, name in zip(found, names, strict=False):
+        campaign.attach(run, name)
     twin = campaign.twin
-    for run in apart:
-        campaign.attach(run, next(names))
+    for run, name in zip(apart, names[len(found) :], strict=True):
+        campaign.attach(run, name)
     campaign.interrupted = True  # what was learnt so far is enough
     return twin, campaign
 

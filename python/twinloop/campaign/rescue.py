@@ -36,7 +36,7 @@ def rescued(test: Test, trajectory: Trajectory) -> str:
         with suppress(OSError):
             path = _free(Path(folder()).resolve(), f"flight-of-test-{number}")
             write_columns(path, columns)
-            return f"The flight of test {number} is in {path}: tell it instead of flying again.{ended}"
+            return f"The flight of test {number} is in {path}: tell that first, or the test is flown once more.{ended}"
     return f"The flight of test {number} could not be written to a file either."
 
 

@@ -8,33 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
-from conftest import PENDULUM_CONTROLLER, PENDULUM_SIGNALS, TINY, pendulum_step
-from lives import SMALL
+from conftest import PENDULUM_CONTROLLER, PENDULUM_SIGNALS
+from logged_flights import GAINS, HIGH, LOW, anywhere, asked, asked_at, flown, new_campaign
 from twinloop.campaign import standing
 from twinloop.campaign.data.gains import flown_otherwise
 from twinloop.errors import RemarkWarning
 from twinloop.faces.result import summary
 
-LOW, HIGH = PENDULUM_SIGNALS.commands[0].bounds
-GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
-
-
-def new_campaign(preset="default"):
-    return tl.Campaign(
-        PENDULUM_SIGNALS, controller=PENDULUM_CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0],
-        duration=2.0, threads=1, preset=preset, options=TINY if preset == "paper" else SMALL,
-    )  # fmt: skip
-
-
-def asked(gains=GAINS, quiet=False):
-    test = new_campaign().test(gains)
-    return test.quiet() if quiet else test
-
 
 def run(test, factor=1.0, noise=1e-3, seed=0):
     """The flight of a test with all or some of its gains multiplied."""
-    plant = tl.systems.Simulated(PENDULUM_SIGNALS, pendulum_step, noise=noise, seed=seed)
-    return plant.run(dataclasses.replace(test, genes=test.genes * factor))
+    return flown(dataclasses.replace(test, genes=test.genes * factor), noise, seed)
 
 
 def found(test, flight, controller=PENDULUM_CONTROLLER):
@@ -42,15 +26,10 @@ def found(test, flight, controller=PENDULUM_CONTROLLER):
     return None if otherwise is None else otherwise.genes
 
 
-places = st.floats(0.1, 0.9)
-
-
 @settings(deadline=None, max_examples=25)
-@given(
-    st.tuples(places, places, places), st.integers(0, 99), st.sampled_from([0.0, 1e-3, 2e-2]), st.booleans()
-)
+@given(**anywhere)
 def test_a_flight_with_the_gains_that_were_asked_for_is_never_accused(place, seed, noise, quiet):
-    test = asked(PENDULUM_CONTROLLER.bind(PENDULUM_SIGNALS).from_unit(place), quiet)
+    test = asked_at(place, quiet)
     assert found(test, run(test, noise=noise, seed=seed)) is None
 
 

@@ -8,26 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
-from conftest import PENDULUM_CONTROLLER, PENDULUM_SIGNALS, pendulum_step
-from lives import SMALL
+from logged_flights import GAINS, flown, new_campaign
 from twinloop.campaign import standing
 from twinloop.campaign.data.mistaken import flight_of
 from twinloop.campaign.excited import Excited, as_excited
 from twinloop.errors import RemarkWarning
 
-GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
 OTHERS = {"angle.kp": 3.0, "angle.ki": 1.0, "angle.kd": 0.4}
-
-
-def new_campaign():
-    return tl.Campaign(
-        PENDULUM_SIGNALS, controller=PENDULUM_CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0],
-        duration=2.0, threads=1, options=SMALL,
-    )  # fmt: skip
-
-
-def flown(test, noise=1e-3, seed=0):
-    return tl.systems.Simulated(PENDULUM_SIGNALS, pendulum_step, noise=noise, seed=seed).run(test)
 
 
 @settings(deadline=None, max_examples=25)

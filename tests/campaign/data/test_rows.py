@@ -8,29 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
-from conftest import PENDULUM_CONTROLLER, PENDULUM_SIGNALS, pendulum_step
-from lives import SMALL
+from conftest import PENDULUM_SIGNALS, pendulum_step
+from logged_flights import GAINS, HIGH, LOW, anywhere, asked, asked_at, flown, new_campaign, of_quadrotor
 from twinloop.campaign.data.rows import MOST, late_commands
 from twinloop.errors import RemarkWarning
-
-LOW, HIGH = PENDULUM_SIGNALS.commands[0].bounds
-GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
-
-
-def new_campaign(**options):
-    return tl.Campaign(
-        PENDULUM_SIGNALS, controller=PENDULUM_CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0],
-        duration=2.0, threads=1, options={**SMALL, **options},
-    )  # fmt: skip
-
-
-def asked(gains=GAINS, quiet=False):
-    test = new_campaign().test(gains)
-    return test.quiet() if quiet else test
-
-
-def flown(test, noise=1e-3, seed=0):
-    return tl.systems.Simulated(PENDULUM_SIGNALS, pendulum_step, noise=noise, seed=seed).run(test)
 
 
 def moved(values, rows):
@@ -42,15 +23,10 @@ def changed(run, commands=lambda u: u, states=lambda x: x):
     return tl.Trajectory(run.t, states(run.states), np.clip(commands(run.commands), LOW, HIGH))
 
 
-places = st.floats(0.1, 0.9)
-
-
 @settings(deadline=None, max_examples=25)
-@given(
-    st.tuples(places, places, places), st.integers(0, 99), st.sampled_from([0.0, 1e-3, 2e-2]), st.booleans()
-)
+@given(**anywhere)
 def test_commands_in_their_own_rows_are_never_accused(place, seed, noise, quiet):
-    test = asked(PENDULUM_CONTROLLER.bind(PENDULUM_SIGNALS).from_unit(place), quiet)
+    test = asked_at(place, quiet)
     assert late_commands(test, flown(test, noise, seed)) == (0,)
 
 
@@ -69,13 +45,7 @@ def test_so_they_are_where_the_excitation_was_not_flown_and_where_a_single_comma
     test = asked()
     run = flown(test.quiet())
     assert late_commands(test, changed(run, lambda u: moved(u, 1))) == (1,)
-    system = tl.systems.Quadrotor(noise=1e-3)
-    campaign = tl.Campaign(
-        system.signals, controller=system.controller, initial_state=system.initial_state,
-        target_state=system.target_state, duration=system.duration, progress=None,
-    )  # fmt: skip
-    test = campaign.test(system.default_gains)
-    run = system.run(test)
+    test, run = of_quadrotor(noise=1e-3)
     assert late_commands(test, run) == (0, 0, 0, 0)
     commands = run.commands.copy()
     commands[:, 2] = moved(commands[:, 2], 2)

@@ -8,6 +8,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
+from logged_flights import of_quadrotor
 from twinloop.campaign.data.readings import froze, ratio
 from twinloop.campaign.data.reports import derived, repeats
 from twinloop.campaign.data.sent import exchanged, exchanged_with_state, other_commands
@@ -177,13 +178,7 @@ def test_commands_of_another_controller_are_found(new_campaign, pendulum):
 
 
 def test_two_commands_exchanged_among_four_are_found_and_named():
-    system = tl.systems.Quadrotor()
-    campaign = tl.Campaign(
-        system.signals, controller=system.controller, initial_state=system.initial_state,
-        target_state=system.target_state, duration=system.duration, progress=None,
-    )  # fmt: skip
-    test = campaign.test(system.default_gains)
-    run = system.run(test)
+    test, run = of_quadrotor()
 
     def recorded(columns):
         commands = run.commands[:, columns]
@@ -196,8 +191,8 @@ def test_two_commands_exchanged_among_four_are_found_and_named():
         assert other_commands([wrong]) == [0]
         pair = exchanged(wrong)
         assert [columns[i] for i in pair] == list(pair[::-1])
-        names = [system.signals.commands[i].name for i in pair]
-        (said_of_it,) = against(wrong, test, system.signals)
+        names = [test.signals.commands[i].name for i in pair]
+        (said_of_it,) = against(wrong, test, test.signals)
         assert said_of_it.sentence.endswith(f"They would be with {names[0]} and {names[1]} exchanged.")
 
 

@@ -10,7 +10,7 @@ import scipy.signal
 import twinloop as tl
 from law_twins import SIGNALS as PENDULUM_SIGNALS
 from law_twins import twin_of
-from twinloop.campaign.examination.late import MOST, periods_borne
+from twinloop.campaign.examination.delay_borne import MOST, periods_borne
 from twinloop.campaign.examination.loops import loops_around
 from twinloop.law.linear.friction import has_friction, sliding
 from twinloop.law.linear.margins import margins_of

@@ -18,7 +18,7 @@ from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.elementary import product
 from twinloop.campaign.data.mistaken import flight_of
-from twinloop.campaign.excited import Excited, as_excited, given, hows, span_of
+from twinloop.campaign.excited import Excited, as_excited, given_in_spans, hows, span_of
 from twinloop.controllers import PID, StateFeedback, UnboundFamily
 from twinloop.controllers.riccati import solve_linear
 from twinloop.identification.records import Run, guessed_noise
@@ -205,7 +205,7 @@ class _Record:
         sent = commands / span
         asked, off = np.zeros_like(sent), np.full(sent.shape[1], np.inf)
         for how in hows(test):
-            gave = _asked(as_excited(test, how), states)
+            gave = given_in_spans(as_excited(test, how), states)
             apart = np.square(sent - gave).mean(axis=0)
             size = float(np.square(gave - gave.mean(axis=0)).mean())
             if apart.mean() <= max(SEEN * SEEN, OFF * OFF * size):
@@ -229,19 +229,19 @@ class _Record:
         test = as_excited(self.test, how)
         widths = np.array([gain.high - gain.low for gain in test.family.gains])
         genes = test.genes.copy()
-        gave = _asked(test, self.states)
+        gave = given_in_spans(test, self.states)
         least = self._left(gave)
         for _ in range(TURNS):
             columns = np.stack(
                 [
-                    (_asked(replace(test, genes=genes + step), self.states) - gave)[self.free].ravel()
+                    (given_in_spans(replace(test, genes=genes + step), self.states) - gave)[self.free].ravel()
                     for step in np.diag(STEP * widths)
                 ],
                 axis=1,
             )
             step = _solved(columns, (self.sent - gave)[self.free].reshape(-1, 1))
             moved = genes + STEP * widths * step[:, 0]
-            after = _asked(replace(test, genes=moved), self.states)
+            after = given_in_spans(replace(test, genes=moved), self.states)
             found = self._left(after)
             if not found < GAINED * least:
                 break
@@ -264,7 +264,7 @@ class _Record:
             columns += [self.states[there, i] - self.states[:-1, i] for i in read]
         design = np.stack(columns, axis=1)
         for how in hows(self.test):
-            asked = _asked(as_excited(self.test, how), self.states)
+            asked = given_in_spans(as_excited(self.test, how), self.states)
             for late in LATE:
                 there = np.clip(places - late, 0, rows - 1)
                 used = self.free & (places - late >= 0) & (places - late < rows)
@@ -281,20 +281,15 @@ class _Record:
         noise = np.sqrt(guessed_noise([run], scales))
         signs = np.where(np.arange(len(self.states)) % 2, -1.0, 1.0)
         quiet = self.test.quiet()
-        before, found = _asked(quiet, self.states), []
+        before, found = given_in_spans(quiet, self.states), []
         for i, sd in enumerate(noise.tolist()):
             states = self.states.copy()
             states[:, i] += sd * signs
-            found.append(float(np.square(_asked(quiet, states) - before)[self.free].mean()))
+            found.append(float(np.square(given_in_spans(quiet, states) - before)[self.free].mean()))
         return np.array(found)
 
     def _left(self, gave: Floats) -> float:
         return float(np.square(self.sent - gave)[self.free].mean())
-
-
-def _asked(test: Test, states: Floats) -> Floats:
-    """What a test's controller gives on readings, in units of the commands' spans (n, n_u)."""
-    return given(test, states) / span_of(test)
 
 
 def _solved(columns: Floats, right: Floats) -> Floats:

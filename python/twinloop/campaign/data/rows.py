@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import enumerated
-from twinloop.campaign.excited import SEEN, as_excited, given, hows, span_of
+from twinloop.campaign.excited import NEARER, SEEN, as_excited, given_in_spans, hows, span_of
 from twinloop.remarks import Remark, serious
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -19,15 +19,13 @@ if TYPE_CHECKING:
 
 MOST = 5
 """Rows by which commands are looked for on either side of theirs."""
-NEARER = 100.0
-"""Times nearer to the controller's, in squares, that commands have to be in other rows."""
 FEWEST = 20
 """Rows at least that are compared."""
 FEW = 5
 """Of these at least that have to be off as they stand: a command that changes once tells nothing of its rows."""
 
 
-class Late(NamedTuple):
+class Shifted(NamedTuple):
     """Commands in other rows than those of their readings.
 
     Args:
@@ -54,9 +52,8 @@ def late_commands(test: Test, run: Trajectory) -> tuple[int, ...]:
     late = np.zeros(run.commands.shape[1], dtype=int)
     if len(run.commands) < FEWEST + MOST:
         return tuple(late.tolist())
-    span = span_of(test)
-    sent = run.commands / span
-    asked = [given(as_excited(test, how), run.states) / span for how in hows(test)]
+    sent = run.commands / span_of(test)
+    asked = [given_in_spans(as_excited(test, how), run.states) for how in hows(test)]
     least = np.full(sent.shape[1], np.inf)
     for shift in (shift for rows in range(1, MOST + 1) for shift in (rows, -rows)):
         left = np.min([_off(sent, each, shift) for each in asked], axis=0)
@@ -71,7 +68,7 @@ def late_commands(test: Test, run: Trajectory) -> tuple[int, ...]:
     return tuple(late.tolist())
 
 
-def in_other_rows(experiments: Sequence[Experiment]) -> list[Late]:
+def in_other_rows(experiments: Sequence[Experiment]) -> list[Shifted]:
     """Commands that were recorded in the rows of later or earlier readings than they were computed from.
 
     Args:
@@ -86,10 +83,10 @@ def in_other_rows(experiments: Sequence[Experiment]) -> list[Late]:
             of = tuple(name for name, each in zip(names, late, strict=True) if each == rows)
             tests = found.setdefault((rows, of), [])
             tests += [run.test.number] if run.test.number not in tests else []
-    return [Late(rows, of, tuple(tests)) for (rows, of), tests in found.items()]
+    return [Shifted(rows, of, tuple(tests)) for (rows, of), tests in found.items()]
 
 
-def from_late_commands(found: Sequence[Late]) -> Iterator[Remark]:
+def from_late_commands(found: Sequence[Shifted]) -> Iterator[Remark]:
     """That commands were recorded in other rows than those of the readings that they were computed from.
 
     A program that sends each command a period after its reading logs the same. What to do is the same, too: with the
@@ -98,11 +95,10 @@ def from_late_commands(found: Sequence[Late]) -> Iterator[Remark]:
     Args:
         found: which, and in which tests.
     """
-    for late in found:
-        yield _said(late)
+    return map(_said, found)
 
 
-def _said(found: Late) -> Remark:
+def _said(found: Shifted) -> Remark:
     shift, names, tests = found.rows, found.commands, found.tests
     rows = f"{abs(shift)} row{'s' * (abs(shift) > 1)}"
     late, other, to = ("late", "−", "up") if shift > 0 else ("early", "+", "down")

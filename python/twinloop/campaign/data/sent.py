@@ -9,7 +9,17 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.data.rows import late_commands
-from twinloop.campaign.excited import Excited, apart, as_excited, excited, given, hidden, hows, span_of
+from twinloop.campaign.excited import (
+    NEARER,
+    Excited,
+    apart,
+    as_excited,
+    excited,
+    given,
+    hidden,
+    hows,
+    span_of,
+)
 from twinloop.campaign.history import Experiment
 from twinloop.remarks import Remark, note, serious
 from twinloop.test import Test
@@ -24,8 +34,6 @@ LEVELS = 5
 """Values that commands have at most that are sent in pulses."""
 EXCHANGED = 20.0
 """Times nearer to the controller's that two commands are once exchanged, in squares, where that was the fault."""
-WITH_STATE = 100.0
-"""The same of a command and a state: there is one column alone to be held against the controller."""
 PULSES = 2.0
 """Times the span of a command that pulses may be behind or ahead of it."""
 
@@ -139,7 +147,8 @@ def _exchanged_with_state(test: Test, run: Trajectory) -> tuple[str, str] | None
         if signals.unmeasured:
             states = completed_readings(states[:, signals.measured], signals, states[0])
         asked = [given(as_excited(test, how), states) for how in hows(test)]
-        if WITH_STATE * min(apart(sent, each, test)[j] for each in asked) <= before[j]:
+        # Unlike of two commands, there is one column alone to be held against the controller.
+        if NEARER * min(apart(sent, each, test)[j] for each in asked) <= before[j]:
             return signals.state_names[i], signals.command_names[j]
     return None
 

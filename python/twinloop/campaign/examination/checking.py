@@ -9,8 +9,8 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import two_digits
 from twinloop._ground.times import shown_time
 from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.delay_borne import MOST
 from twinloop.campaign.examination.examination import Examination
-from twinloop.campaign.examination.late import MOST
 from twinloop.campaign.examination.reaching import REACHED, Ending
 from twinloop.law.linear.margins import LoopMargins
 from twinloop.planning.leaving import risk_words

@@ -20,8 +20,8 @@ from twinloop.campaign.examination.correlation import (
     lags_of,
 )
 from twinloop.campaign.examination.data import DataQuality, data_quality, movements
+from twinloop.campaign.examination.delay_borne import periods_borne
 from twinloop.campaign.examination.frequency import Responses, frequency_responses
-from twinloop.campaign.examination.late import periods_borne
 from twinloop.campaign.examination.learning import ErrorMap, error_map
 from twinloop.campaign.examination.loops import (
     ClosedCurves,
@@ -235,14 +235,14 @@ class Examination:
                 else self.innovations[place]
             )
             saturated = max((each.saturated for each in effort(run.trajectory, self.signals)), default=0.0)
-            found.append(data_quality(run, self._sensors, own, saturated))
+            found.append(data_quality(run, self.sensors, own, saturated))
         return tuple(found)
 
     @cached_property
     def movement(self) -> tuple[str, float] | None:
         """The measured state that moved least, its largest motion in a flight in sensor noises; None: unknown noise."""
         found = [
-            movements(continued(flown, self.signals, flown.states[0]).states, self._sensors)
+            movements(continued(flown, self.signals, flown.states[0]).states, self.sensors)
             for flown in (run.trajectory for run in self.experiments)
         ]
         known = [each for each in found if each is not None]
@@ -253,7 +253,7 @@ class Examination:
         return self.signals.state_names[place], float(most[place])
 
     @property
-    def _sensors(self) -> Floats | None:
+    def sensors(self) -> Floats | None:
         """Standard deviation of each state's sensor (n_x,), 0 of a state that has none; None: unknown."""
         if self.twin.noise is None:
             return None

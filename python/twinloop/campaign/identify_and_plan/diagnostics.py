@@ -9,7 +9,7 @@ from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.odd_one_out import odd_one_out
 from twinloop.campaign.data.readings import suspicious
-from twinloop.campaign.data.rows import Late
+from twinloop.campaign.data.rows import Shifted
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.history import Experiment, called
@@ -50,7 +50,7 @@ class Findings:
     follows: bool
     misses: Sequence[Miss] = ()
     others: Sequence[int] = ()
-    late: Sequence[Late] = ()
+    late: Sequence[Shifted] = ()
     recurring: tuple[str, ...] = ()
     unanswered: bool = False
     unmoved: Sequence[str] = ()

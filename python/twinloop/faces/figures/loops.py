@@ -163,7 +163,7 @@ def closed(found: Examination) -> Figure | None:
 def _of_friction(found: Examination) -> str:
     """What is drawn of dry friction."""
     return (
-        " The twin's dry friction slides; pale are also all models as it sticks."
+        " The twin's dry friction slides; a second bundle of lines is of all models as it sticks."
         if found.has_friction
         else ""
     )

@@ -101,7 +101,7 @@ def gains(found: Examination) -> Figure | None:
         )
     none = any(each.of_range for each in found.slopes)
     of_none = (
-        " A gain of 0 is changed by shares of its range, as ± 20 % of 0 is nothing, and so is one below 1 % of it."
+        " A gain below 1 % of its range is changed by shares of the range: 20 % of nearly nothing would show nothing."
         if none
         else ""
     )

@@ -1,4 +1,4 @@
-"""Late commands: how much more delay the flight of a task bears."""
+"""Delay borne: how many more periods of delay the flight of a task bears."""
 
 from __future__ import annotations
 
