@@ -286,4 +286,4 @@ def test_a_gain_of_0_is_changed_by_a_share_of_its_range(good):
     assert slope.qualities[-1] == pytest.approx(expected, rel=1e-6) and expected != slope.qualities[2]
     figure = gains(SimpleNamespace(slopes=(slope,), setup=good.setup))
     assert figure.panels[0].x_label == "change of the gain (% of its range)"
-    assert "A gain of 0 is changed by shares of its range" in figure.caption
+    assert "A gain below 1 % of its range is changed by shares of the range" in figure.caption
