@@ -88,8 +88,8 @@ class IdentificationOptions:
             for each term that it has more.
         lasts: whether of laws that the readings hardly tell apart the one is believed that lasts under most controllers
             drawn from the box of gains.
-        earlier_twin: whether the earlier twin is kept if it follows all flights and the new
-            one does not.
+        earlier_twin: whether the earlier twin, as it was or tuned on all flights, is kept if it explains all flights
+            and the new one does not, or follows them far better.
         inside: whether flights that left their envelope for good are learnt as far as they were inside, where no law
             explains all of them.
         tame: whether the law known before, tuned on all flights, is kept if the new one diverges under more controllers

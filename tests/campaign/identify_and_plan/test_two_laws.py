@@ -1,6 +1,6 @@
 """Of two laws that explain nothing the one is believed that foretells flights, and gains have to be good on both."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,21 +10,17 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import twinloop as tl
+from named_answers import answer, identified_as
 from strategies import program_text
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
-from twinloop.campaign.identify_and_plan.answer import Answer
-from twinloop.campaign.identify_and_plan.following import Following
 from twinloop.campaign.identify_and_plan.learning import (
-    ROUGH,
     better_of,
-    is_rough,
-    or_lasted_before,
     stands_in,
 )
 from twinloop.campaign.identify_and_plan.two_laws import TwoLaws, better_foretold, compared
-from twinloop.law.actuation import Actuation, Actuator
+from twinloop.law.actuation import Actuator
 
 INF = float("inf")
 WORKERS = _core.Workers(1)
@@ -45,34 +41,6 @@ def flight(drag, steps=40):
     commands = np.ones((steps, 1))
     run = tl.Trajectory(t, speed[:, np.newaxis], commands)
     return SimpleNamespace(replayed=Replay(SIGNALS, [0.0], commands), trajectory=run, number=None, test=None)
-
-
-@dataclass(frozen=True)
-class Known:
-    """What little of an identification is looked at here."""
-
-    model: str
-    members: list
-    remarks: list
-    actuation: Actuation
-    terms: int = 1
-
-
-AT_ONCE = Actuator()
-
-
-def identified_as(name, actuator=AT_ONCE, remarks=(ROUGH,)):
-    """A linear law."""
-    return Known(name, [name], list(remarks), Actuation((actuator,)))
-
-
-def answer(free, frozen=1.0, follows=True, name="a"):
-    """Of one member with such free runs."""
-    rows = np.atleast_2d(free)
-    followed = Following(
-        rows, np.ones_like(rows), np.full(rows.shape[1], frozen), np.ones(rows.shape[1], dtype=int)
-    )
-    return Answer(identified_as(name), followed, follows, {}, (), True, [name])
 
 
 RATIOS = arrays(
@@ -176,21 +144,6 @@ def test_a_nonlinear_law_that_misses_more_than_a_linear_one_sits_nowhere(free, l
     if nonlinear.worst > rough.worst:
         found = better_of(nonlinear, rough, "linear")
         assert found.identified.model == "r" and list(found.believed) == [found.identified.model]
-
-
-def test_the_linear_law_of_before_is_kept_where_it_lasts_and_the_new_one_does_not():
-    lasts, diverges = answer([[0.3, 0.4]], name="before"), answer([[0.1, INF]], name="now")
-    earlier = identified_as("before")
-    kept = or_lasted_before(diverges, earlier, lambda found, number: replace(lasts, identified=found))
-    assert kept.identified.model == "before" and is_rough(kept.identified)
-    assert [remark.code for remark in kept.identified.remarks] == ["rough", "lasted-before"]
-    neither = or_lasted_before(diverges, earlier, lambda found, number: replace(diverges, identified=found))
-    assert neither is diverges
-
-
-def test_the_linear_law_of_before_is_not_even_looked_at_where_the_new_one_lasts():
-    now = answer([[0.3, 0.4]], name="now")
-    assert or_lasted_before(now, identified_as("before"), lambda *_, **__: pytest.fail("looked at")) is now
 
 
 @pytest.mark.parametrize("late", [Actuator(0.02, 0), Actuator(0.0, 1)])

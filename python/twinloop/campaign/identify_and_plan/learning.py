@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
@@ -17,6 +17,13 @@ from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, drawn_controllers, lasting_under
 from twinloop.campaign.identify_and_plan.inside import enough_inside, inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
+from twinloop.campaign.identify_and_plan.known_before import (
+    or_foretold,
+    or_known_again,
+    or_known_before,
+    or_lasted_before,
+    with_remark,
+)
 from twinloop.campaign.identify_and_plan.lessons import lesson_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
@@ -31,7 +38,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.terms.directions import Direction, of_mixer
-from twinloop.remarks import Remark, note, serious
+from twinloop.remarks import serious
 
 PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
@@ -45,18 +52,6 @@ ROUGH = serious(
     " a nonlinear one. So the twin is linear, and rough: this may be enough to tune gains, but it is not a simulator.",
 )
 """What is said of a twin that is linear because no law explains the flights and no other one is better."""
-BEFORE = note(
-    "known-before",
-    "The twin learnt from all flights misses some of them in free run by more than any disturbance explains; the"
-    " twin of before the last flight does not. The earlier twin is kept.",
-)
-"""What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
-LASTED = note(
-    "lasted-before",
-    "The linear law learnt from all flights diverges on one of them in free run, or does not follow them. The one of"
-    " before the last flight lasts on all, and is kept.",
-)
-"""What is said of a linear law that has not learnt all flights and follows them, where the one that has does not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,19 +139,20 @@ class Learner:
             if found is not None:
                 told, answer, begun = found
                 doubted = self._doubted(answer, told)
-        if self.options.tame and earlier is not None:
-            # Readings that are wrong, late ones and the form are those of the search anew.
-            first_step = None if begun is None else replace(begun, searches=())
-            known_again = partial(
-                told.identify, self.options.as_known, iteration=AGAIN + experiments, under_way=first_step
-            )
-            tamer = self._tamer(answer, doubted, earlier, known_again, told)
+        if earlier is not None:
+            again = cache(partial(self._known_again, told, earlier, begun))
+            if not answer.explained and self.options.earlier_twin:
+                answer = or_known_again(answer, again())
+                doubted = self._doubted(answer, told)
+            tamer = self._tamer(answer, doubted, earlier, again, told) if self.options.tame else None
             if tamer is not None:
                 answer, doubted = tamer, self._doubted(tamer, told)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if self.options.plain != self.options and doubted:
             rough = with_remark(told.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, told.answered(rough, number=2), two, told)
+        if asked is not None and self.options.earlier_twin and self._misses(answer, told):
+            answer = or_foretold(answer, asked.identified, asked.experiments, told.answered)
         identified = answer.identified
         model = None if earlier is None else earlier.model
         lesson = lesson_of(
@@ -220,14 +216,27 @@ class Learner:
             return True
         everywhere = self._drawn(told.flights, 0)
         (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
-        return 2 * lasting < DRAWN and bool(answer.misses(told.flights, self.setup, self.workers))
+        return 2 * lasting < DRAWN and self._misses(answer, told)
+
+    def _misses(self, answer: Answer, told: Told) -> bool:
+        """Whether a law misses flights by more than noise and known disturbances explain."""
+        return not answer.explained or bool(answer.misses(told.flights, self.setup, self.workers))
+
+    def _known_again(self, told: Told, known: Identified, begun: UnderWay | None) -> Answer:
+        """The law known before, tuned on all flights: wrong and late readings, and the form, are of the search anew."""
+        first_step = None if begun is None else replace(begun, searches=())
+        iteration = AGAIN + len(told.flights)
+        identified = told.identify(
+            self.options.as_known, iteration=iteration, earlier=known, under_way=first_step
+        )
+        return told.answered(identified, number=4)
 
     def _tamer(
         self,
         answer: Answer,
         doubted: bool,
         known: Identified,
-        known_again: Callable[..., Identified],
+        known_again: Callable[[], Answer],
         told: Told,
     ) -> Answer | None:
         """The law known before, tuned on all flights, where it is tamer than that of an answer and follows nearly."""
@@ -239,9 +248,10 @@ class Learner:
 
         if not is_wilder(answer.identified, known, lasting(known), doubted):
             return None
-        again = known_again(earlier=known)
-        tame, both = told.answered(with_remark(again, TAME), number=4), lasting(again)
-        wilder = is_wilder(answer.identified, again, both, doubted)
+        again = known_again()
+        tame = replace(again, identified=with_remark(again.identified, TAME))
+        both = lasting(again.identified)
+        wilder = is_wilder(answer.identified, again.identified, both, doubted)
         return tame.with_doubtful_disturbances() if wilder and follows_nearly(tame, answer, both) else None
 
     def _drawn(self, flights: Sequence[Experiment], number: int) -> Floats:
@@ -292,32 +302,6 @@ class Learner:
         return [] if mixer is None else of_mixer(mixer.matrix, self.setup.signals)
 
 
-def or_known_before(answer: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
-    """What was known before the last flights, where it explains all of them: it has not learnt the last.
-
-    Args:
-        answer: of what all flights teach, which does not.
-        earlier: what was known before the last of them.
-        answered: holds what was identified against all flights.
-    """
-    known = answered(as_known_before(earlier, BEFORE), number=1)
-    return known if known.explained else answer
-
-
-def or_lasted_before(rough: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
-    """The linear law of before the last flights, where it follows all and lasts on each, and the present one does not.
-
-    Args:
-        rough: linear law learnt from all flights.
-        earlier: the one of before the last of them.
-        answered: holds what was identified against all flights.
-    """
-    if rough.believable:
-        return rough
-    known = answered(as_known_before(earlier, LASTED), number=3)
-    return known if known.believable else rough
-
-
 def better_of(
     answer: Answer, rough: Answer, foretold: Kind | None, lasting: Sequence[bool] = (True, True)
 ) -> Answer:
@@ -355,15 +339,3 @@ def is_rough(identified: Identified) -> bool:
 def stands_in(identified: Identified) -> bool:
     """Whether it is such a linear law, with a lag or a delay that stands for what no law explains."""
     return is_rough(identified) and not all(actuator.direct for actuator in identified.actuation.actuators)
-
-
-def as_known_before(identified: Identified, said: Remark) -> Identified:
-    """What was known before the last flights, which says so."""
-    earlier = (BEFORE.code, LASTED.code, TAME.code)
-    others = [each for each in identified.remarks if each.code not in earlier]
-    return with_remark(replace(identified, remarks=others), said)
-
-
-def with_remark(identified: Identified, remark: Remark) -> Identified:
-    """The same with a remark more."""
-    return replace(identified, remarks=[*identified.remarks, remark])

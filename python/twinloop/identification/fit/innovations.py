@@ -100,10 +100,16 @@ class _Likelihood:
         for run, weights in zip(hypothesis.runs, self.counted, strict=True):
             nothing = np.zeros((len(weights) - 1, 1))
             records.append((run.states[:, self.states], weights, nothing, nothing, nothing))
+        self._known: dict[bytes, float] = {}
+        """Lengths of the noise that was looked at, which climbing comes back to."""
         self.readings_alone = _core.Regression(len(self.states), dt, chain.form, records)
         """The readings alone: of a likelihood they know the determinant, which is that of the kinematics."""
 
     def __call__(self, chain: Chain) -> float:
+        """The length under the noise of a chain, which has the states and the form of this one."""
+        key = np.concatenate([chain.sensors, chain.motion]).tobytes()
+        if (known := self._known.get(key)) is not None:
+            return known
         fit = self.hypothesis.fit
         assert fit is not None
         observer = (*fit.observer[: self.i], chain, *fit.observer[self.i + 1 :])
@@ -116,7 +122,9 @@ class _Likelihood:
         )
         determinant = self.readings_alone.log_determinant(chain.sensors, chain.motion)
         disturbance = CORRELATED * self.context.options.price_disturbances
-        return squares + determinant + disturbance * (chain.motion.correlated > 0.0)
+        return self._known.setdefault(
+            key, squares + determinant + disturbance * (chain.motion.correlated > 0.0)
+        )
 
     def climbed(self, chain: Chain) -> tuple[Chain, float]:
         """The most likely noise that is reached from a chain's by changing one number at a time.
