@@ -90,6 +90,11 @@ def test_the_law_known_before_is_kept_with_constants_of_all_flights_where_it_exp
     assert or_known_again(now, replace(again, follows=False)) is now
     diverges = answer([[0.01, INF]], name="again", missed=False)
     assert or_known_again(now, diverges) is now
+    # What follows far worse explains the flights by disturbances.
+    close = answer([[0.004, 0.009]], name="now")
+    assert or_known_again(close, again) is close
+    nearly = answer([[0.01, 0.011]], name="now")
+    assert or_known_again(nearly, again).identified.model == "again"
 
 
 def test_a_law_that_has_foretold_a_flight_is_kept_without_it():
@@ -98,6 +103,9 @@ def test_a_law_that_has_foretold_a_flight_is_kept_without_it():
     assert kept.identified.model == "before" and codes(kept)[-1] == FORETOLD.code
     worse = answer([[0.003, 0.003, 0.71]], name="before")
     assert or_foretold(now, identified_as("before"), 2, found_by(worse)) is now
+    # Nor is one compared that was followed over pieces of other lengths.
+    longer = replace(before, followed=replace(before.followed, lengths=2 * before.followed.lengths))
+    assert or_foretold(now, identified_as("before"), 2, found_by(longer)) is now
     lost = replace(before, follows=False)
     assert or_foretold(now, identified_as("before"), 2, found_by(lost)) is now
 

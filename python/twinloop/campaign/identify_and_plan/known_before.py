@@ -14,7 +14,7 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop.campaign.identify_and_plan.answer import Answer
-from twinloop.campaign.identify_and_plan.tame import TAME
+from twinloop.campaign.identify_and_plan.tame import NEARLY, TAME
 from twinloop.identification.identified import Identified
 from twinloop.remarks import Remark, note
 
@@ -63,13 +63,15 @@ def or_known_before(answer: Answer, earlier: Identified, answered: Answered) -> 
 
 
 def or_known_again(answer: Answer, again: Answer) -> Answer:
-    """The law known before with constants tuned on all flights, where it explains them, and lasts on each.
+    """The law known before with constants tuned on all flights, where it explains them, and follows nearly as well.
+
+    Much explains a law that follows them far worse: whatever it misses is then taken for a disturbance.
 
     Args:
         answer: of what all flights teach, which does not.
         again: that law.
     """
-    if not (again.explained and again.lasts):
+    if not (again.explained and again.lasts and again.worst <= NEARLY * answer.worst):
         return answer
     return replace(again, identified=as_known_before(again.identified, AGAIN))
 
@@ -84,7 +86,9 @@ def or_foretold(answer: Answer, earlier: Identified, learnt: int, answered: Answ
         answered: holds what was identified against all flights.
     """
     known = answered(as_known_before(earlier, FORETOLD), number=6)
-    better = far_better(known.followed.ratios[0], answer.followed.ratios[0], learnt)
+    # Over longer pieces of a log any law is further off.
+    same = np.array_equal(known.followed.lengths, answer.followed.lengths)
+    better = same and far_better(known.followed.ratios[0], answer.followed.ratios[0], learnt)
     return known if better and known.believable else answer
 
 
