@@ -131,14 +131,17 @@ def test_each_direction_is_excited_as_strongly_as_the_controller_would_for_a_sha
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_it_grows_during_the_flight_and_the_next_flight_begins_where_it_ended(seed):
+def test_it_grows_during_the_flight_and_the_next_flight_begins_half_way_and_grows_as_far_again(seed):
     flat, first, second = grown(seed, most=0.0), grown(seed), grown(seed, flights=1)
     moving = np.abs(flat) > 1e-9
     ratio = np.where(moving, first / np.where(moving, flat, 1.0), np.nan)
     # From one tenth of the flight to three quarters, as much in each period.
     expected = GROWTH ** np.clip((np.arange(100) / 100 - 0.1) / 0.65, 0.0, 1.0)
     np.testing.assert_allclose(ratio, np.where(moving, expected[:, None], np.nan), rtol=1e-6)
-    np.testing.assert_allclose(second, GROWTH * first, rtol=1e-6, atol=1e-12)
+    again = np.where(moving, second / np.where(moving, first, 1.0), np.nan)
+    # At each place it is no more than as many times as strong as the flight before was there.
+    np.testing.assert_allclose(again, np.where(moving, np.sqrt(GROWTH * expected)[:, None], np.nan), rtol=1e-6)
+    np.testing.assert_allclose(grown(seed, flights=2)[:10], GROWTH * first[:10], rtol=1e-6, atol=1e-12)
     # Up to the largest that is allowed, in every direction.
     _, _, _, slopes = three_axes(seed)
     left = np.linalg.svd(slopes)[0]

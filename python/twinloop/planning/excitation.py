@@ -5,6 +5,8 @@ While no law is known, the controller says how strongly they begin, and what the
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from twinloop import _core
@@ -47,7 +49,7 @@ def growing_chirps(
     gain. So each direction has a chirp of the size that the controller itself would send along it for states that are
     off by `SHARE` of their envelopes; where it sends nothing, the smallest of the others. How much more the system
     bears, the flight itself shows: the chirps grow from cycle to cycle, and are held back once the states answer. A
-    flight that has borne them lets the next begin where it ended.
+    flight that has borne them lets the next begin half-way to where it ended, in factors, and go on as far again.
 
     Args:
         signals: of the system.
@@ -65,7 +67,9 @@ def growing_chirps(
     vectors, answers = along
     first = np.minimum(amplitude, SHARE * answers)
     first = np.where(answers > 0.0, first, first.min(where=answers > 0.0, initial=amplitude))
-    begin, end = (np.maximum(first, np.minimum(first * GROWTH**k, most)) for k in (flights, flights + 1))
+    # The task itself moves the states most at its beginning: what is borne at its end may be too much there.
+    growths = sqrt(GROWTH**flights), GROWTH ** (flights + 1)
+    begin, end = (np.maximum(first, np.minimum(first * growth, most)) for growth in growths)
     passed = np.arange(steps)[:, np.newaxis] / steps
     entering = np.minimum(1.0, passed / ENTERING)
     into = np.clip((passed - ENTERING) / max(1.0 - fade - ENTERING, 1.0 / steps), 0.0, 1.0)
