@@ -140,7 +140,9 @@ def test_it_grows_during_the_flight_and_the_next_flight_begins_half_way_and_grow
     np.testing.assert_allclose(ratio, np.where(moving, expected[:, None], np.nan), rtol=1e-6)
     again = np.where(moving, second / np.where(moving, first, 1.0), np.nan)
     # At each place it is no more than as many times as strong as the flight before was there.
-    np.testing.assert_allclose(again, np.where(moving, np.sqrt(GROWTH * expected)[:, None], np.nan), rtol=1e-6)
+    np.testing.assert_allclose(
+        again, np.where(moving, np.sqrt(GROWTH * expected)[:, None], np.nan), rtol=1e-6
+    )
     np.testing.assert_allclose(grown(seed, flights=2)[:10], GROWTH * first[:10], rtol=1e-6, atol=1e-12)
     # Up to the largest that is allowed, in every direction.
     _, _, _, slopes = three_axes(seed)
