@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 CONTROLLERS = ROOT / "crates" / "twinloop-core" / "src" / "controller"
 
@@ -10,6 +12,14 @@ CONTROLLERS = ROOT / "crates" / "twinloop-core" / "src" / "controller"
 def code():
     for folder in (*ROOT.glob("crates/*/src"), ROOT / "python" / "twinloop"):
         yield from (path for path in folder.rglob("*") if path.suffix in (".rs", ".py", ".pyi"))
+
+
+@pytest.mark.parametrize("room", ["campaign", "identification", "planning"])
+def test_every_module_of_the_rooms_that_learn_and_plan_is_named(room):
+    guide = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    parts = (ROOT / "python" / "twinloop" / room).rglob("*.py")
+    unnamed = {path.stem for path in parts if not re.search(rf"\b{path.stem}\b", guide)}
+    assert unnamed <= {"__init__"}
 
 
 def test_a_new_law_of_control_changes_as_many_files_as_are_counted():

@@ -1,5 +1,6 @@
 """Every example runs as it stands, in a process and a folder of its own."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,9 @@ NEEDS = {
 """Packages of others that an example needs; the test set-up brings them."""
 COMPILED = ("fmu",)
 """Examples that compile C; what builds the native module has a compiler, and so have the checks."""
+DOCS = Path(__file__).parents[2] / "docs"
+SHOWN = {"three_days": "three-days.md"}
+"""Pages that show, line by line, what an example prints."""
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 
@@ -41,3 +45,13 @@ def test_an_example_runs_and_shows_something(example, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
+    if example.stem in SHOWN:
+        shown = (DOCS / SHOWN[example.stem]).read_text(encoding="utf-8")
+        printed = without_times(done.stdout)
+        for line in without_times("".join(re.findall(r"```text\n(.*?)```", shown, re.DOTALL))).splitlines():
+            assert line.removesuffix("...").rstrip() in printed, line
+
+
+def without_times(text):
+    """What is printed again, whenever it is."""
+    return re.sub(r"20\d\d-\d\d-\d\dT[\d:]+", "TIME", text)

@@ -8,6 +8,7 @@ import pytest
 from twinloop.campaign.campaign_file import SECTIONS
 from twinloop.faces.dashboard.desk import LOST, in_words
 from twinloop.store import Doing
+from twinloop.store.schema import metadata
 from twinloop_exam.command import bench
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -32,6 +33,20 @@ def test_every_option_of_a_study_is_in_its_table(study):
         r"^\| `(--[\w-]+)", section("command-line.md", f"`twinloop bench {study}`"), re.MULTILINE
     )
     assert set(listed) == options
+
+
+def test_every_table_of_a_store_is_listed_with_its_columns():
+    listed = {}
+    for names, columns in re.findall(
+        r"^\| (`\w+`(?:, `\w+`)*) \|[^|]*\| (.*) \|$", section("concepts/store.md", "Tables"), re.MULTILINE
+    ):
+        for name in re.findall(r"`(\w+)`", names):
+            listed[name] = set(re.findall(r"`(\w+)`", columns))
+    kept = {
+        table.name: {column.name for column in table.columns} - {"id", "campaign", "number"}
+        for table in metadata.sorted_tables
+    }
+    assert listed == kept
 
 
 def test_the_page_on_the_dashboard_quotes_what_is_said_of_a_writer_that_was_killed():
