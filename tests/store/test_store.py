@@ -67,6 +67,18 @@ def test_what_was_made_and_told_is_committed_when_the_call_returns(path, pendulu
     assert [len(rows(path, table)) for table in ("tests", "asked", "checkpoints")] == [2, 1, 1]
 
 
+def test_what_is_committed_is_on_the_disk_even_if_the_power_goes(path):
+    """With a log beside it SQLite forces each commit to the disk at FULL, 2, and at NORMAL, 1, some later."""
+    stored(path).close()
+    store = opened(path)
+    with store.transaction() as connection:
+        found = [
+            connection.exec_driver_sql(f"PRAGMA {name}").scalar() for name in ("journal_mode", "synchronous")
+        ]
+    store.close()
+    assert found == ["wal", 2]
+
+
 def test_a_refused_call_leaves_no_row(path, pendulum):
     campaign = flown(stored(path), pendulum)
     short = tl.Trajectory([0.0], [[0.0, 0.0]], np.empty((0, 1)))

@@ -16,6 +16,7 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
 from oracles import same_bits
 from twinloop.contracts import check_system
+from twinloop.systems import fmu
 
 pytest.importorskip("fmpy", reason="needs pip install 'twinloop[fmu]'")
 pytestmark = pytest.mark.skipif(
@@ -140,7 +141,9 @@ def test_a_twin_that_was_exported_is_flown_like_the_twin(
     np.testing.assert_allclose(again.states, campaign.twin.simulate(campaign.tests[0]).states, atol=1e-9)
 
 
-def test_what_is_no_fmu_or_has_no_such_variable_is_refused(make, tmp_path, pendulum_signals, path):
+def test_what_is_no_fmu_or_has_no_such_variable_is_refused(
+    make, tmp_path, pendulum_signals, path, monkeypatch
+):
     for changes, sentence in (
         ({"commands": {}}, "Unknown variable of the FMU for commands: 'torque'"),
         ({"commands": {"torqe": "motor"}}, "did you mean 'torque'"),
@@ -159,6 +162,10 @@ def test_what_is_no_fmu_or_has_no_such_variable_is_refused(make, tmp_path, pendu
             other.unlink()
         with pytest.raises(tl.InvalidInput, match=sentence):
             tl.systems.FMU(other, pendulum_signals)
+    with monkeypatch.context() as small:
+        small.setattr(fmu, "MOST_BYTES", 1000)
+        with pytest.raises(tl.InvalidInput, match=r"expected at most 1000 bytes unpacked, found \d+"):
+            make()
     bad = tmp_path / "bad.fmu"
     with zipfile.ZipFile(bad, "w") as packed:
         packed.writestr("modelDescription.xml", described())

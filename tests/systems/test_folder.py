@@ -12,6 +12,7 @@ from conftest import PENDULUM_GAINS
 from oracles import same_bits
 from twinloop.contracts import check_system
 from twinloop.logs import write_columns
+from twinloop.systems.folder import LOOK
 
 
 @pytest.fixture
@@ -69,16 +70,18 @@ class Rig(threading.Thread):
                     for part in (text[: len(text) // 2], text[len(text) // 2 :]):
                         file.write(part)
                         file.flush()
-                        time.sleep(0.1)
+                        time.sleep(2.0 * LOOK)  # so that half of a log is looked at, and has to be waited for
             time.sleep(0.02)
 
 
 def test_a_campaign_flies_through_a_folder_and_a_restart_asks_nothing_twice(
     make, tmp_path, pendulum, pendulum_controller, new_campaign
 ):
-    system = make(timeout=20.0, settled=0.3, default_gains=PENDULUM_GAINS)
+    system = make(timeout=20.0, settled=4.0 * LOOK, default_gains=PENDULUM_GAINS)
     rig = Rig(tmp_path / "drop", pendulum, pendulum_controller)
-    check_system(make(timeout=20.0, settled=0.3, default_gains=PENDULUM_GAINS), pendulum_controller, steps=20)
+    check_system(
+        make(timeout=20.0, settled=4.0 * LOOK, default_gains=PENDULUM_GAINS), pendulum_controller, steps=20
+    )
     (tmp_path / "drop" / "test-0000.json").unlink()
     (tmp_path / "drop" / "flight-0000.csv").unlink()
     campaign = new_campaign(store=tmp_path / "x.db")
