@@ -18,6 +18,7 @@ from twinloop._ground.texts import in_unit
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard.band import BandWatch
+from twinloop.guard.rounded import RoundedWatch
 from twinloop.guard.sensors import SensorWatch
 from twinloop.law.reports import sensed
 from twinloop.law.twin import Twin
@@ -97,7 +98,12 @@ class Guard:
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
         limits = Limits(self.signals) if limits is None else limits
         known = () if twin is None else twin.flights
-        self._sensors = SensorWatch(limits.readings, known, self.signals.measured, self._band is not None)
+        noise = None if twin is None or twin.noise is None else twin.noise.sensors
+        banded = self._band is not None
+        self._sensors = SensorWatch(limits.readings, known, self.signals.measured, banded, noise)
+        self._rounded: RoundedWatch | None = None
+        if twin is not None and self._sensors.limit is not None and self._sensors.pitches.any():
+            self._rounded = RoundedWatch(twin, self._sensors.pitches, self._sensors.limit)
         self._controller = test.controller()
         self._differences = Differences(self.signals)
         self._states = np.empty((test.steps + 1, n_x))
@@ -237,12 +243,18 @@ class Guard:
     def _watch(self, reading: Floats) -> None:
         """Trips on the first thing that is wrong."""
         missing, frozen = self._sensors.missing(reading), self._sensors.frozen(reading)
+        if self._rounded is not None and self.period <= self.test.steps and not missing.any():
+            self._states[self.period] = reading
+            flown = self._states[: self.period + 1], self._commands[: self.period]
+            frozen |= self._rounded.frozen(*flown, self._sensors.repeated)
         states = self.signals.states
         self._last = None if missing.any() else reading.copy()
         if missing.any() or frozen.any():
             self._broken = missing | frozen
             i = int(np.argmax(self._broken))
-            if not missing[i]:
+            if not missing[i] and self._sensors.pitches[i] > 0.0:
+                what = "has not changed for too long, though by the twin it should have moved"
+            elif not missing[i]:
                 what = "has not changed in its last bit for too long"
             elif not np.isfinite(reading[i]):
                 what = "is not a finite number"
