@@ -438,6 +438,95 @@ def test_a_controller_in_c_commands_the_same(which):
     c_controller(*single, "loop", 2, "float")(states, target)
 
 
+def in_python(described, family, genes):
+    return python_controller(controller_python(described, family, genes))
+
+
+def in_c(described, family, genes):
+    return c_controller(*controller_c(described, family, genes, "loop"), "loop", 2, "double")
+
+
+EXPORTED = pytest.mark.parametrize("exported", [in_python, pytest.param(in_c, marks=needs_cc)])
+BOUNDS = np.array([command.bounds for command in THREE.commands])
+
+
+@EXPORTED
+@pytest.mark.parametrize("which", CONTROLLERS)
+@pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
+def test_an_exported_controller_repeats_its_last_command_where_a_reading_is_missing_and_forgets_the_call(
+    exported, which, missing
+):
+    described = CONTROLLERS[which]
+    family, genes, states, target, _ = led(described, 3)
+    command = exported(described, family, genes)
+    alone = command(states, target)
+    # After each reading some are missing: what the others give is as if nobody had called.
+    broken = np.repeat(states, 3, axis=0)
+    broken[1::3, 0] = missing
+    broken[2::3, :2] = missing
+    np.testing.assert_array_equal(command(broken, target), np.repeat(alone, 3, axis=0))
+    targets = np.repeat(np.tile(target, (len(states), 1)), 2, axis=0)
+    targets[1::2, 0] = missing
+    np.testing.assert_array_equal(command(np.repeat(states, 2, axis=0), targets), np.repeat(alone, 2, axis=0))
+
+
+@EXPORTED
+@pytest.mark.parametrize("which", CONTROLLERS)
+def test_before_its_first_reading_an_exported_controller_sends_what_it_does_without_any_error(
+    exported, which
+):
+    described = CONTROLLERS[which]
+    family, genes, states, target, _ = led(described, 3)
+    rest = family.controller(genes).command(np.zeros(3), np.zeros(3))
+    command = exported(described, family, genes)
+    found = command(np.concatenate([np.full((2, 3), np.nan), states]), target)
+    np.testing.assert_allclose(found[:2], [rest, rest], rtol=1e-15)
+    np.testing.assert_array_equal(found[2:], command(states, target))
+
+
+@EXPORTED
+@pytest.mark.parametrize("which", CONTROLLERS)
+@pytest.mark.parametrize("huge", [1e154, 1.7e308])
+def test_an_exported_controller_sends_a_command_within_its_bounds_whatever_it_reads(exported, which, huge):
+    described = CONTROLLERS[which]
+    family, genes, states, target, _ = led(described, 3)
+    wild = np.repeat(states, 2, axis=0)
+    wild[1::2] = huge * np.where(np.arange(len(states))[:, np.newaxis] % 3, 1.0, -1.0)
+    found = exported(described, family, genes)(wild, target)
+    assert np.isfinite(found).all()
+    assert (found >= BOUNDS[:, 0]).all() and (found <= BOUNDS[:, 1]).all()
+    # What an integral made of a number that large nobody can take back, but where it overflows it is not taken.
+    assert np.isfinite(exported(described, family, genes)(np.concatenate([wild, states]), target)).all()
+
+
+@EXPORTED
+def test_a_reading_that_the_law_does_not_need_may_be_missing(exported):
+    described = CONTROLLERS["cascade"]
+    family, genes, states, target, expected = led(described, 3)
+    without = np.where([True, True, False], states, np.nan)
+    found = exported(described, family, genes)(without, target)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@needs_cc
+def test_a_controller_in_c_is_plain_c99_and_refuses_to_be_compiled_without_missing_readings(tmp_path):
+    for which, described in CONTROLLERS.items():
+        family, genes, *_ = led(described, 1)
+        for precision in ("double", "float"):
+            for suffix, text in zip(
+                "hc", controller_c(described, family, genes, "loop", precision), strict=True
+            ):
+                (tmp_path / f"loop.{suffix}").write_text(text)
+            strict = ["-Wall", "-Wextra", "-Werror", "-pedantic"]
+            for standard in ("-std=c99", "-std=gnu11"):
+                command = ["cc", standard, *strict, "-c", "loop.c"]
+                assert subprocess.run(command, cwd=tmp_path, check=False).returncode == 0, which
+    fast = subprocess.run(
+        ["cc", "-ffast-math", "-c", "loop.c"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert fast.returncode != 0 and "without -ffast-math" in fast.stderr
+
+
 @needs_both
 def test_a_program_in_cpp_calls_a_twin_and_its_controller_in_c(tmp_path):
     twin = twin_of(PENDULUM, offsets=(0.08, 0.0))  # late, so that functions of its sensors are declared, too

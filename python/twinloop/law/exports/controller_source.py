@@ -7,16 +7,20 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from twinloop._core import __version__
 from twinloop._ground.arrays import Floats
 from twinloop.controllers import PID, Cascade, Family, Mixer, StateFeedback, UnboundFamily
 from twinloop.errors import NotAvailable
-from twinloop.law.exports.c_words import BEGIN_C, END_C
+from twinloop.law.exports.c_words import BEGIN_C, END_C, number
 from twinloop.signals import Signals
 from twinloop.unmeasured import in_words
 
 DECIMAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)")
 """A number with a point or an exponent, as Python writes it."""
+READ = re.compile(r"(?:state|target)\[\d+\]")
+"""An entry of the state or of the target."""
 
 
 @dataclass(frozen=True)
@@ -177,11 +181,35 @@ def _axes(sheet: _Sheet, described: PID | Cascade, gains: dict[str, float]) -> N
             sheet.let(integral, f"chosen({' + '.join(pushed)}, {before}, {integral})")
 
 
+def _at_rest(described: UnboundFamily, signals: Signals) -> list[float]:
+    """What a controller sends without any error (n_u,): that of its mixer for no output, or 0, within the bounds."""
+    output = described.output if isinstance(described, (PID, Cascade, StateFeedback)) else None
+    offset = np.zeros(signals.n_u) if output is None or output.offset is None else output.offset
+    power = 1.0 if output is None else output.power
+    low, high = np.array([command.bounds for command in signals.commands]).T
+    sent: list[float] = np.clip(np.copysign(np.abs(offset) ** power, offset), low, high).tolist()
+    return sent
+
+
+def _read(lines: Sequence[Assignment]) -> list[str]:
+    """Which entries of the state and the target a law needs, in their order."""
+    return sorted({entry for line in lines for entry in READ.findall(line.value)}, key=_place)
+
+
+def _place(entry: str) -> tuple[str, int]:
+    name, _, place = entry.rstrip("]").partition("[")
+    return name, int(place)
+
+
 def _number(value: float) -> str:
     return f"({value!r})" if value < 0.0 else repr(float(value))
 
 
 _PYTHON_HELPERS = '''
+def finite(values):
+    return all(math.isfinite(value) for value in values)
+
+
 def clip(a, low, high):
     return min(max(a, low), high)
 
@@ -220,7 +248,7 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
         NotAvailable: a family that cannot be written down.
     """
     lines, memory = law_lines(described, family, genes)
-    signals = family.signals
+    signals, rest = family.signals, _at_rest(described, family.signals)
     head = [
         f'"""A controller tuned by Twinloop {__version__}: one call of `command` a period of {signals.dt:g} s."""',
         "",
@@ -232,21 +260,33 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
         f"GAINS = {family.parameters(genes)!r}",
         "",
     ]
-    body = [f"        {line.target} = {line.value}" for line in lines]
+    body = [f"            {line.target} = {line.value}" for line in lines]
     return "\n".join([
         *head, _PYTHON_HELPERS, "",
         "class Controller:", '    """One controller with its memory."""', "",
         "    def __init__(self):", "        self.reset()", "",
         "    def reset(self):", '        """Forgets the run so far."""',
-        f"        self._memory = [0.0] * {memory}", "",
+        f"        self._memory, self._sent = [0.0] * {memory}, {rest!r}", "",
         "    def command(self, state, target):",
-        '        """What to send for the coming period, for a measured state and a target."""',
+        '        """What to send for the coming period, within the bounds, for a measured state and a target.',
+        "",
+        *(f"        {line}" for line in _missing(signals, rest)),
+        '        """',
         "        for what, given in (('state', state), ('target', target)):",
         "            if len(given) != len(STATES):",
         "                expected = f\"{len(STATES)} numbers ({', '.join(STATES)})\"",
         "                raise ValueError(f\"command: {what}: expected {expected}, found {len(given)}\")",
-        f"        memory, command = self._memory, [0.0] * {signals.n_u}",
-        *body, "        return command", "",
+        f"        memory, command = self._memory.copy(), [0.0] * {signals.n_u}",
+        f"        if not finite([{', '.join(_read(lines))}]):",
+        "            return self._sent.copy()",
+        "        try:",
+        *body,
+        "        except (ArithmeticError, ValueError):",
+        "            return self._sent.copy()",
+        "        if not (finite(memory) and finite(command)):",
+        "            return self._sent.copy()",
+        "        self._memory, self._sent = memory, command.copy()",
+        "        return command", "",
     ])  # fmt: skip
 
 
@@ -269,7 +309,8 @@ def controller_c(
         NotAvailable: a family that cannot be written down.
     """
     lines, memory = law_lines(described, family, genes)
-    signals, big = family.signals, name.upper()
+    signals, big, rest = family.signals, name.upper(), _at_rest(described, family.signals)
+    n_u = signals.n_u
     gains = [f"   {key} = {value!r}" for key, value in family.parameters(genes).items()]
     declared = (
         f"void {name}_command({name}_memory *memory_, const {name}_real state[{signals.n_x}],\n"
@@ -283,9 +324,12 @@ def controller_c(
         f"#ifndef {big}_H", f"#define {big}_H", "",
         *BEGIN_C,
         f"typedef {precision} {name}_real;", "",
-        f"typedef struct {{\n    {name}_real values[{max(1, memory)}];\n}} {name}_memory;", "",
+        f"typedef struct {{\n    {name}_real values[{max(1, memory)}];\n    {name}_real sent[{n_u}];",
+        f"}} {name}_memory;", "",
         "/* Forgets the run so far. */", f"void {name}_reset({name}_memory *memory_);", "",
-        "/* What to send for the coming period, within the bounds, for a measured state and a target. */",
+        "/* What to send for the coming period, within the bounds, for a measured state and a target.", "",
+        *(f"   {line}" for line in _missing(signals, rest)),
+        "   Compile without -ffast-math, which takes every number for finite. */",
         f"{declared};", "", *END_C, "#endif", "",
     ])  # fmt: skip
     body = []
@@ -296,16 +340,61 @@ def controller_c(
         body.append(text)
     text = "\n".join(body)
     helpers = [helper for key, helper in _c_helpers(precision).items() if f"{key}(" in text]
+    read, usable = _read(lines), [f"all_finite(memory, {memory})"] if memory else []
+    usable.append(f"all_finite(command, {n_u})")
     source = "\n".join([
         f"/* Written by Twinloop {__version__}; see {name}.h. */", f'#include "{name}.h"', "", "#include <math.h>", "",
-        f"typedef {name}_real real;", "", *helpers,
+        "#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__",
+        '#error "Compile this file without -ffast-math: a missing reading is NaN, and has to be seen."', "#endif", "",
+        f"typedef {name}_real real;", "", *helpers, _FINITE,
+        f"static void repeated(const {name}_memory *memory_, real *command)", "{",
+        *_looped(n_u, "command[i] = memory_->sent[i];"), "}", "",
         declared, "{",
-        *(["    real *memory = memory_->values;"] if memory else ["    (void)memory_;"]),
-        text, "}", "",
+        f"    const real given[{len(read)}] = {{{', '.join(read)}}};",
+        *([f"    real memory[{memory}];"] if memory else []),
+        *_repeating(f"!all_finite(given, {len(read)})"),
+        *(_looped(memory, "memory[i] = memory_->values[i];") if memory else []),
+        text,
+        *_repeating(f"!({' && '.join(usable)})"),
+        *(_looped(memory, "memory_->values[i] = memory[i];") if memory else []),
+        *_looped(n_u, "memory_->sent[i] = command[i];"), "}", "",
         f"void {name}_reset({name}_memory *memory_)", "{",
-        f"    for (int i = 0; i < {max(1, memory)}; ++i) {{", "        memory_->values[i] = 0;", "    }", "}", "",
+        *_looped(max(1, memory), "memory_->values[i] = 0;"),
+        *(f"    memory_->sent[{j}] = {number(value, precision)};" for j, value in enumerate(rest)), "}", "",
     ])  # fmt: skip
     return header, source
+
+
+def _missing(signals: Signals, rest: Sequence[float]) -> list[str]:
+    """What becomes of a reading that is missing, for whoever calls the controller."""
+    before = ", ".join(
+        f"{command.name} {value:g}" for command, value in zip(signals.commands, rest, strict=True)
+    )
+    return [
+        "Where a number that the law needs is not finite, as a missing reading is, it repeats its last command,",
+        "and remembers nothing of the call; before the first usable reading it sends what it sends without any error:",
+        f"{before}. It does so for as long as the reading is missing: stop the system if that lasts.",
+    ]
+
+
+_FINITE = """static int all_finite(const real *values, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        if (!isfinite(values[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+"""
+
+
+def _repeating(condition: str) -> list[str]:
+    return [f"    if ({condition}) {{", "        repeated(memory_, command);", "        return;", "    }"]
+
+
+def _looped(count: int, statement: str) -> list[str]:
+    return [f"    for (int i = 0; i < {count}; ++i) {{", f"        {statement}", "    }"]
 
 
 def _c_helpers(precision: str) -> dict[str, str]:
