@@ -170,12 +170,13 @@ def _broken(line: Line, flown: Floats, piece: int) -> Line:
     """A free run as it was followed: it ends after each piece, and begins again at the reading there.
 
     Args:
-        line: its states (m,).
+        line: its states (m,); more than were flown where the test was stopped before its end.
         flown: readings (n + 1,).
         piece: steps; n or more where it is whole.
     """
     x, y = np.asarray(line.x), np.asarray(line.y)
-    again = np.arange(piece, len(y) - 1, piece)
+    # Behind the last reading there is none to begin again at.
+    again = np.arange(piece, min(len(y), len(flown)) - 1, piece)
     behind = np.repeat(again + 1, 2)
     gaps = np.stack([np.full(len(again), np.nan), flown[again]], axis=1).ravel()
     return replace(line, x=np.insert(x, behind, np.repeat(x[again], 2)), y=np.insert(y, behind, gaps))
