@@ -12,6 +12,7 @@ from twinloop._ground.texts import to_type
 from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
 from twinloop.campaign.differing import differences
+from twinloop.campaign.keeping import as_begun, check_setup
 from twinloop.campaign.presets import PRESETS
 from twinloop.campaign.system_section import SystemSection, said_by, system_section
 from twinloop.controllers import UnboundFamily
@@ -157,13 +158,28 @@ class CampaignFile:
         """
         campaign = Campaign(**self.arguments, **others)
         try:
-            self._check_first(campaign)
+            self._check_first(campaign, campaign.store)
         except InvalidInput:
             campaign.close()
             raise
         return campaign
 
-    def _check_first(self, campaign: Campaign) -> None:
+    def check(self, known: Campaign, store: str, name: str) -> None:
+        """Refuses a campaign that was begun with something else, in the words of `campaign`.
+
+        Args:
+            known: as its store has it.
+            store: what messages call the store.
+            name: of the campaign in its store.
+
+        Raises:
+            InvalidInput: the campaign has another setup, or its first test has other gains.
+        """
+        asked = Campaign(**self.arguments, threads=1, progress=None)
+        check_setup(known.setup, asked.setup, as_begun(store, name))
+        self._check_first(known, store)
+
+    def _check_first(self, campaign: Campaign, store: str | None) -> None:
         """Refuses other gains than those of the first test that was made; what a system says of them nobody typed."""
         # One that failed or was abandoned waits for gains of another controller.
         gone = ("failed", "abandoned")
@@ -173,7 +189,7 @@ class CampaignFile:
         differ = differences({"first": made.parameters}, {"first": {**campaign.family.fixed, **self.first}})
         if differ:
             raise InvalidInput(
-                f"Campaign file {self.path}: expected the gains that the first test of {campaign.store} was made with,"
+                f"Campaign file {self.path}: expected the gains that the first test of {store} was made with,"
                 f" found others: {differ}; write those of the store, or copy the file for another campaign."
             )
 
@@ -196,11 +212,12 @@ class CampaignFile:
         )
 
 
-def read_file(path: str | Path) -> CampaignFile:
+def read_file(path: str | Path, begun: System | None = None) -> CampaignFile:
     """Reads a campaign file.
 
     Args:
         path: of the file.
+        begun: stands in for the system of the file, where the file leaves something to it; None: that system is made.
 
     Returns:
         What it says.
@@ -227,8 +244,8 @@ def read_file(path: str | Path) -> CampaignFile:
                     " out and take those of the system."
                 )
     if flies is not None and not all(key in found for key in needed):
-        made = system_named(flies.use, flies.arguments, signals, path.resolve().parent)
-        signals = made.signals
+        made = begun or system_named(flies.use, flies.arguments, signals, path.resolve().parent)
+        signals = signals or made.signals
     own = made is not None and "task" not in found
     task = said_by(made, TASK, path) if own else _section(found, "task", TASK, TASK)
     arguments = {
@@ -244,6 +261,20 @@ def read_file(path: str | Path) -> CampaignFile:
     if made is not None and "first" not in found:
         first = dict(said_by(made, ("default_gains",), path)["default_gains"])
     return CampaignFile(path, arguments, first, flies, made)
+
+
+def said_in(path: str | Path) -> set[str]:
+    """Which sections a campaign file has.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        InvalidInput: no such file, no TOML, or an unknown section.
+    """
+    found = _toml_of(Path(path))
+    _keys(found, SECTIONS, (), str(path))
+    return set(found)
 
 
 def read_signals(path: str | Path) -> tuple[Signals, Mapping[str, Any]]:

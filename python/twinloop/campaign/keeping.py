@@ -58,11 +58,7 @@ class Keeping:
         try:
             held = found(store, name)
             assert held is not None  # the keeper has entered it
-            check_setup(
-                Setup.from_record(held.setup),
-                setup,
-                f"Store {store.name}: expected the campaign {name!r} as it was begun",
-            )
+            check_setup(Setup.from_record(held.setup), setup, as_begun(store.name, name))
             self._keeper.open_session(provenance(threads))
         except BaseException:
             self.close()
@@ -226,6 +222,16 @@ def _check_name(name: object) -> None:
             f"Campaign, name: expected a text of 1 to 200 characters, found {name!r}; name it."
         )
     text("Campaign, name", name)
+
+
+def as_begun(store: str, name: str) -> str:
+    """What is expected of who goes on with a campaign, as the beginning of a sentence.
+
+    Args:
+        store: what messages call it.
+        name: of the campaign.
+    """
+    return f"Store {store}: expected the campaign {name!r} as it was begun"
 
 
 def check_setup(known: Setup, asked: Setup, what: str) -> None:

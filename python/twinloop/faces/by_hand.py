@@ -18,6 +18,7 @@ from twinloop.faces.answering import answer, json_option
 from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
+from twinloop.faces.opening import opened_by_hand
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
 from twinloop.faces.telling import against_it, counted, numbered, tell_failed, to_be_flown
@@ -60,7 +61,7 @@ def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | N
     if batch is not None:
         _ask_batch(store, batch, last or again, threads, as_json)
         return
-    with closing(_campaign(store, threads)) as campaign:
+    with closing(opened_by_hand(store, threads)) as campaign:
         waiting = campaign.waiting
         # Whatever was attached: the first test is the controller that is trusted.
         if all(run.attached for run in campaign.experiments):
@@ -75,7 +76,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
     """Alternatives: those that wait, and as many more as are missing."""
     if other:
         raise InvalidInput("ask: expected --batch alone, found --last or --again beside it; leave one out.")
-    with closing(_campaign(store, threads)) as campaign:
+    with closing(opened_by_hand(store, threads)) as campaign:
         if not campaign.experiments:
             raise InvalidInput(
                 "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
@@ -128,7 +129,7 @@ def tell(
 ) -> None:
     """Record the result of a TEST: a FLIGHT as CSV or .npz, complete or aborted, or why there is none."""
     log = _told(store, test, flight, failed, aborted, reason)
-    with closing(_campaign(store)) as campaign:
+    with closing(opened_by_hand(store)) as campaign:
         if failed is not None:
             asked, read = tell_failed(campaign, test, failed, log)
         else:
@@ -200,7 +201,7 @@ def _aborted(store: str, test: int, log: Path, why: str) -> str:
 @json_option
 def attach(store: str, flight: Path, as_json: bool) -> None:
     """Add a recorded FLIGHT without a test, as CSV or .npz."""
-    with closing(_campaign(store)) as campaign:
+    with closing(opened_by_hand(store)) as campaign:
         read = attach_flight(campaign, flight)
         text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
         remarks = against_it(campaign, campaign.experiments[-1], None, read)
@@ -216,7 +217,7 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
 @json_option
 def abandon(store: str, test: int, as_json: bool) -> None:
     """Mark a TEST as not to be flown."""
-    with closing(_campaign(store)) as campaign:
+    with closing(opened_by_hand(store)) as campaign:
         asked = numbered(campaign, test)
         campaign.abandon(asked)
         text = f"Saved: test {test} abandoned in {shown_name(store)}."
@@ -243,26 +244,6 @@ def _as_expected(campaign: Campaign, test: Test) -> str:
     expected = "" if test.predicted is None else f", predicted {foretold(test)}"
     unit = quality_unit(campaign.setup.quality)
     return f", quality {runs[-1]:.4g}{expected}{f' {unit}' if unit else ''}"
-
-
-def _campaign(store: str, threads: int | None = None) -> Campaign:
-    """The campaign of a store; it is begun from the file beside it where there is none."""
-    file = file_beside(store)
-    if file is not None and file.exists():
-        begun = file.with_suffix(".db")
-        # A name that was mistyped must not begin a second campaign.
-        if begun.exists() and not Path(store).exists():
-            raise InvalidInput(
-                f"Store {store}: expected {begun}, which has the campaign of {file}, found another name; for another"
-                " campaign, copy the file."
-            )
-        return read_file(file).campaign(store=store, threads=threads)
-    if file is None or Path(store).exists():
-        return Campaign.load(store, threads=threads)
-    raise InvalidInput(
-        f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
-        f" {to_type('new', file)}."
-    )
 
 
 def _first(store: str, campaign: Campaign) -> Test:

@@ -7,8 +7,10 @@ from pathlib import Path
 import click
 
 from twinloop.campaign import Campaign
+from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput, NotTrusted, unknown
 from twinloop.faces.answering import answer, json_option
+from twinloop.faces.opening import opened_to_look, say_if_changed
 from twinloop.law.exports.export import PRECISIONS, SUFFIXES
 from twinloop.law.twin import load_twin
 from twinloop.store import is_address
@@ -71,21 +73,19 @@ def export(
                 )
             made = twin.export(to, kind=of_file, precision=precision, force=force)
         else:
-            held = _campaign(source, name)
+            known = look(source, name, read_only=True).name
+            held = Campaign.load(source, known, read_only=True)
+            say_if_changed(source, held, known)
             made = held.export_twin(to, kind=of_file, precision=precision, force=force)
     else:
         if file is not None and file.suffix == ".json":
             raise InvalidInput(
                 "Export: expected a store with a campaign, found JSON, which holds a twin alone."
             )
-        held = _campaign(source, name)
+        held, _ = opened_to_look(source, name)
         made = held.export_controller(to, kind=of_file, precision=precision, force=force)
     if isinstance(made, str):
         answer({"kind": kind, "text": made}, made.removesuffix("\n"), as_json)
     else:
         files = [str(path) for path in made]
         answer({"kind": kind, "files": files}, f"Wrote {', '.join(files)}.", as_json)
-
-
-def _campaign(store: str, name: str | None) -> Campaign:
-    return Campaign.load(store, name, read_only=True)

@@ -14,9 +14,9 @@ from twinloop.autopilots.declared import Declared
 from twinloop.autopilots.files import FORMATS
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_autopilot
-from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput
 from twinloop.faces.from_file import file_beside
+from twinloop.faces.opening import opened_to_look
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -76,12 +76,13 @@ def prepared(store: str, name: str | None, kind: str | None, mapping: Path | Non
         mapping: file of the declaration; None: the campaign file beside the store.
 
     Raises:
-        InvalidInput: no store, no such campaign, a declaration that cannot be used, or none where a kind was asked for.
+        InvalidInput: no store, no such campaign, a campaign file beside it that describes another one, a declaration
+            that cannot be used, or none where a kind was asked for.
         StoreFailure: the store cannot be read.
     """
-    held = look(store, name, read_only=True)
+    campaign, known = opened_to_look(store, name)
     declared, autopilot = _declared(store, kind, mapping)
-    return Prepared(Campaign.load(store, held.name, read_only=True), held.name, declared, autopilot)
+    return Prepared(campaign, known, declared, autopilot)
 
 
 def _declared(store: str, kind: str | None, mapping: Path | None) -> tuple[Declared | None, Autopilot | None]:

@@ -12,10 +12,11 @@ import click
 from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import behind
-from twinloop.campaign.keeping import look
+from twinloop.campaign.keeping import heading, look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
+from twinloop.faces.opening import say_if_changed
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.telling import counted
@@ -77,10 +78,12 @@ def resume(
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
     """Learn from all recorded flights of a campaign of STORE, as the next ask would, without planning a test."""
-    with closing(Campaign.load(store, name, threads=threads)) as campaign:
+    known, _ = heading(store, name)
+    with closing(Campaign.load(store, known, threads=threads)) as campaign:
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
             _ = campaign.best_test
+        say_if_changed(store, campaign, known)
         text = f"Learnt from {counted(campaign)}: {to_type('show', shown_name(store))}\n"
         _print({"learnt": len(campaign.experiments)}, text, as_json)
 
@@ -110,6 +113,7 @@ def show(store: str, name: str | None, as_json: bool) -> None:
         text += f"\n{render(shown, _learnt(campaign, held))}"
         if result["controller"] is not None and result["controller"]["test"] is None:
             text += f"To fly the tuned gains: {to_type('ask', shown_name(store), '--last')}\n"
+    say_if_changed(store, campaign, held.name)
     _print({"store": facts, "result": result}, text, as_json)
 
 

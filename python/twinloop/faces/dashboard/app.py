@@ -24,6 +24,7 @@ from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopEr
 from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.dashboard.desk import Desk, unlearnt
 from twinloop.faces.dashboard.fence import App, Fence
+from twinloop.faces.opening import changed_since
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
@@ -205,7 +206,9 @@ class Pages:
         advice = advised_to_stop(campaign) if to_be_flown(campaign) else None
         return {
             "experiments": len(campaign.experiments),
-            "unlearnt": unlearnt(campaign),
+            "unlearnt": " ".join(
+                filter(None, [unlearnt(campaign), changed_since(self.desk.store, campaign, name)])
+            ),
             "tests": [
                 {
                     "number": test.number,
@@ -245,7 +248,7 @@ class Pages:
         return self._reports[name][1]
 
     def _sheet(self, name: str, number: int) -> str:
-        campaign = self.desk.look(name)
+        campaign = self.desk.agreeing(name)
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test) if campaign.history else None
         against = serious_of(latest_lesson(campaign))
@@ -254,7 +257,7 @@ class Pages:
         return sheet(self.desk.title, test, predicted, file, campaign.setup, against, waiting, advice)
 
     def _columns(self, name: str, number: int) -> str:
-        campaign = self.desk.look(name)
+        campaign = self.desk.agreeing(name)
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test) if campaign.history else None
         with tempfile.TemporaryDirectory() as folder:

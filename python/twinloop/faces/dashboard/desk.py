@@ -11,6 +11,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
+from twinloop.faces.opening import check_beside
 from twinloop.faces.telling import against_it, attach, counted, numbered, tell, tell_failed, to_be_flown
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
 from twinloop.logs import Log
@@ -66,6 +67,19 @@ class Desk:
         campaign.interrupted = True  # what was learnt so far is enough
         return campaign
 
+    def agreeing(self, name: str) -> Campaign:
+        """The same, for what is sent to a rig: the campaign file beside the store must describe it.
+
+        Args:
+            name: of the campaign.
+
+        Raises:
+            InvalidInput: no such campaign, or another one in the file.
+        """
+        campaign = self.look(name)
+        check_beside(self.store, campaign, name)
+        return campaign
+
     def state(self, name: str) -> dict[str, object]:
         """Whether anything has changed, what is going on, and why the last long thing failed.
 
@@ -100,7 +114,8 @@ class Desk:
             InvalidInput: it is not waiting to be flown.
             StoreFailure: the store cannot be written.
         """
-        if number not in [test.number for test in to_be_flown(self.look(name))]:
+        campaign = self.agreeing(name)
+        if number not in [test.number for test in to_be_flown(campaign)]:
             raise InvalidInput(f"Test {number}: expected one that waits to be flown, found another one.")
         with closing(opened(self.store)) as base:
             approve(base, name, number)
@@ -187,7 +202,7 @@ class Desk:
             InvalidInput: no such flight, or no reason.
             StoreFailure: somebody else writes the campaign.
         """
-        with self._writing(name) as campaign:
+        with self._writing(name, agreeing=False) as campaign:
             known = recorded(campaign)
             if which not in known:
                 raise InvalidInput(
@@ -211,6 +226,7 @@ class Desk:
 
         def plan() -> None:
             with self._campaign(name) as campaign:
+                check_beside(self.store, campaign, name)
                 if not campaign.experiments:
                     raise NotAvailable(
                         "Ask: expected a recorded flight, found none; record the first test, or attach a flight."
@@ -241,12 +257,14 @@ class Desk:
             self._turn.release()
 
     @contextmanager
-    def _writing(self, name: str) -> Iterator[Campaign]:
+    def _writing(self, name: str, agreeing: bool = True) -> Iterator[Campaign]:
         """The campaign, with this process as its only writer, one thing at a time."""
         if not self._turn.acquire(blocking=False):
             raise InvalidInput("Expected no other task to be running, found one; wait until it is done.")
         try:
             with self._campaign(name) as campaign:
+                if agreeing:
+                    check_beside(self.store, campaign, name)
                 yield campaign
         finally:
             self._turn.release()

@@ -12,6 +12,7 @@ from twinloop.faces.answering import answer, json_option
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture
 from twinloop.faces.files import check_writable
+from twinloop.faces.opening import say_if_changed
 from twinloop.faces.report.comparison import compared, comparison, comparison_page
 from twinloop.faces.report.page import source_page, templates
 from twinloop.faces.report.source import source
@@ -39,6 +40,7 @@ def report(campaign: str, name: str | None, output: Path | None, form: str | Non
     check_writable(path, [".html"])
     templates()  # what is missing is said before any work
     found = source(campaign, name)
+    say_if_changed(campaign, found.campaign, found.name)
     text = source_page(found)
     write_whole(path, text)
     answer({"files": [str(path)]}, f"Report: {path}", as_json, err=True)
@@ -53,7 +55,9 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[s
                 " another one."
             )
         folder.mkdir()
-    examined, files = source(campaign, name).campaign.examine(), []
+    found = source(campaign, name)
+    say_if_changed(campaign, found.campaign, found.name)
+    examined, files = found.campaign.examine(), []
     for figure_name, drawn in FIGURES.items():
         figure = drawn(examined)
         if figure is not None:
@@ -83,6 +87,8 @@ def compare(first: str, second: str, names: tuple[str, ...], output: Path | None
         templates()
     chosen = (names or (None,)) * 2 if len(names) < 2 else names
     sources = [source(where, name) for where, name in zip((first, second), chosen, strict=False)]
+    for where, each in zip((first, second), sources, strict=True):
+        say_if_changed(where, each.campaign, each.name)
     names_shown, answers = [each.name for each in sources], compared(sources)
     if len(set(names_shown)) == 1:  # such as "campaign", which each has that nobody named
         names_shown = [shown_name(where) for where in (first, second)]
