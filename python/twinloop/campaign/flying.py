@@ -97,7 +97,13 @@ def fly(
                 f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; the test was not flown{kept}"
             )
         announce()
-        failed = _flown(campaign, system, test, timeout, failed)
+        before = len(campaign.experiments)
+        try:
+            failed = _flown(campaign, system, test, timeout, failed)
+        finally:
+            # A test that failed has left no flight; one that landed at Ctrl-C has.
+            if campaign.landed is not None and len(campaign.experiments) > before:
+                campaign.landed(test, campaign.experiments[-1])
 
 
 def _refuse_silence(campaign: Campaign, test: Test) -> None:

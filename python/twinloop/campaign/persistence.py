@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 from twinloop import _core
 from twinloop._ground.arrays import whole
 from twinloop.campaign.coevolution.method import Coevolution
-from twinloop.campaign.history import Progress
+from twinloop.campaign.history import Experiment, Progress
 from twinloop.campaign.identify_and_plan.method import IdentifyAndPlan
 from twinloop.campaign.keeping import Keeping, heading, look
 from twinloop.campaign.logbook import Logbook
@@ -27,6 +27,7 @@ from twinloop.errors import InvalidInput
 from twinloop.law.twin import Twin
 from twinloop.records import Record, Recorded, checked_record
 from twinloop.store import Stored
+from twinloop.test import Test
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -48,6 +49,8 @@ class Persistent(Recorded):
                 f" {progress!r}; pass a function."
             )
         self.progress = progress
+        # Called in `run` with each test and its flight once that is recorded; flights go on unless it raises.
+        self.landed: Callable[[Test, Experiment], None] | None = None
         self._own_progress = OwnProgress(setup.options)
         self.interrupted = False
         self._workers = _core.Workers(threads=self.threads)
@@ -133,6 +136,7 @@ class Persistent(Recorded):
         campaign = object.__new__(type(self))
         campaign.setup, campaign.threads = self.setup, self.threads
         campaign.progress, campaign.interrupted = self.progress, self.interrupted
+        campaign.landed = self.landed
         campaign._own_progress = OwnProgress(self.setup.options)
         campaign._workers = _core.Workers(threads=self.threads)
         campaign._book = self._book.copied()

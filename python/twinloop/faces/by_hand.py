@@ -21,7 +21,7 @@ from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import opened_by_hand
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
-from twinloop.faces.telling import against_it, counted, numbered, tell_failed, to_be_flown
+from twinloop.faces.telling import against_it, counted, numbered, said_against, tell_failed, to_be_flown
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
@@ -226,8 +226,8 @@ def abandon(store: str, test: int, as_json: bool) -> None:
 
 def _say(remarks: Sequence[str]) -> None:
     """Says what speaks against a flight at once, while somebody can still look at the rig."""
-    for remark in remarks:
-        click.echo(f"Against this flight: {remark}", err=True)
+    for line in said_against(remarks):
+        click.echo(line, err=True)
 
 
 def _standing(campaign: Campaign, test: Test) -> dict[str, object]:

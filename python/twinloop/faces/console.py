@@ -100,6 +100,14 @@ class Watch:
                 self._line(progress, rate, remaining), highlight=False, soft_wrap=True, markup=False
             )
 
+    def say(self, line: str) -> None:
+        """Says something that stays: above the table, where there is one.
+
+        Args:
+            line: for a person.
+        """
+        self._console.print(line, highlight=False, soft_wrap=True, markup=False)
+
     def _now(self) -> Table:
         """The table as it is at this moment; called from the thread that redraws it."""
         with self._lock:

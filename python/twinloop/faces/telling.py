@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -173,18 +174,28 @@ def to_be_flown(campaign: Campaign) -> list[Test]:
     return [test for test in campaign.tests if campaign.status(test) == "asked"]
 
 
-def against_it(campaign: Campaign, flight: Experiment, test: Test | None, read: Log) -> list[str]:
+def against_it(campaign: Campaign, flight: Experiment, test: Test | None, read: Log | None) -> list[str]:
     """What speaks against a flight that was told or attached: said at once, while somebody can still look at the rig.
 
     Args:
         campaign: that it was recorded in.
         flight: one of its experiments.
         test: of the flight, as it was asked for; None: it was attached.
-        read: its log.
+        read: its log; None: a system recorded it without one.
     """
-    found = against(flight, test, campaign.signals, read.lines)
-    said = [remark.sentence for remark in (*read.remarks, *found)]
+    of_file = () if read is None else read.remarks
+    found = against(flight, test, campaign.signals, None if read is None else read.lines)
+    said = [remark.sentence for remark in (*of_file, *found)]
     return [*said, *_told_twice(campaign, flight, test)]
+
+
+def said_against(remarks: Sequence[str]) -> list[str]:
+    """The same as lines for a person, whoever recorded the flight.
+
+    Args:
+        remarks: of one flight.
+    """
+    return [f"Against this flight: {remark}" for remark in remarks]
 
 
 def _told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> list[str]:

@@ -13,14 +13,18 @@ from twinloop._ground.arrays import number
 from twinloop._ground.texts import to_type
 from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable
 from twinloop.faces.result import Result, summary, to_json
 from twinloop.faces.run_info import Stopwatch
+from twinloop.faces.telling import against_it, said_against
 from twinloop.faces.terminal import is_closed, is_utf_8
 from twinloop.faces.text import render
-from twinloop.systems import Quadrotor, System
+from twinloop.store import shown_name
+from twinloop.systems import Folder, Quadrotor, System
+from twinloop.test import Test
 
 Answer = TypeVar("Answer")
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -115,6 +119,7 @@ def work(
     """
     clock = Stopwatch(campaign.threads)
     stopped = False
+    campaign.landed = lambda test, flight: _say_against(campaign, rig, watch, experiments, test, flight)
     try:
         with watch, suppress(KeyboardInterrupt):
             try:
@@ -142,6 +147,23 @@ def work(
         _uninterrupted(lambda: campaign.plot(plot))
         click.echo(f"Picture: {plot}", err=True)
     return 130 if campaign.interrupted else 1 if stopped or result["controller"] is None else 0
+
+
+def _say_against(
+    campaign: Campaign, rig: System, watch: Watch, experiments: int, test: Test, flight: Experiment
+) -> None:
+    """Says what speaks against a flight as it lands, as `tell` does, and that flights go on all the same."""
+    lines = said_against(against_it(campaign, flight, test, rig.log if isinstance(rig, Folder) else None))
+    if lines and campaign.runs < experiments:
+        back = ""
+        if campaign.store is not None:
+            withdraw = to_type("withdraw", shown_name(campaign.store), test.number, "--reason", "WHY")
+            back = f" To take this one back: {withdraw}"
+        lines.append(
+            f"Flights go on after test {test.number}, whatever speaks against it; Ctrl-C stops them.{back}"
+        )
+    for line in lines:
+        watch.say(line)
 
 
 def show_result(result: Result, as_json: bool) -> None:

@@ -56,6 +56,13 @@ class Log:
     lines: Sequence[int] | None
     remarks: tuple[Remark, ...] = ()
 
+    def warn(self) -> None:
+        """Says its remarks as Python does, as a `RemarkWarning` each at the line of the caller's caller."""
+        for remark in self.remarks:
+            warnings.warn(
+                f"Log {self.called}: {remark.sentence} ({remark.code})", RemarkWarning, stacklevel=3
+            )
+
     def trajectory(self, ended: str = "completed", reason: str = "") -> Trajectory:
         """The flight.
 
@@ -122,8 +129,7 @@ def load(
         NotAvailable: a `.ulg` without the package pyulog.
     """
     log = read_log(path, signals, name, columns, Window(start, stop))
-    for remark in log.remarks:
-        warnings.warn(f"Log {log.called}: {remark.sentence} ({remark.code})", RemarkWarning, stacklevel=2)
+    log.warn()
     return log.trajectory(ended, reason)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from twinloop._ground.arrays import number
 from twinloop._ground.writing import write_whole
 from twinloop.errors import InvalidInput, NoAnswer, TwinloopError
-from twinloop.logs import load
+from twinloop.logs import Log, read_log
 from twinloop.signals import Signals
 from twinloop.systems.base import System
 from twinloop.test import Test, check_signals
@@ -56,6 +56,7 @@ class Folder(System):
                 f"Folder, signals: expected twinloop.Signals, found {signals!r}; describe them."
             )
         self.path, self._signals = Path(path), signals
+        self.log: Log | None = None
         self.timeout = None if timeout is None else number("Folder, timeout (s)", timeout, above=0.0)
         self.settled = number("Folder, settled (s)", settled, above=0.0)
         if default_gains is not None:
@@ -142,7 +143,9 @@ class Folder(System):
                 reason = " ".join(file.read(LONGEST_REASON).decode("utf-8", "replace").split())
         ended = "aborted" if why.exists() else "completed"
         try:
-            run = load(log, self._signals, ended=ended, reason=reason or "the rig stopped it")
+            self.log = read_log(log, self._signals)
+            self.log.warn()
+            run = self.log.trajectory(ended, reason or "the rig stopped it")
         except TwinloopError as refusal:
             raise NoAnswer(f"{refusal} Correct {log.name}, and go on.") from refusal
         if run.steps > test.steps or (ended == "completed" and run.steps < test.steps):

@@ -12,7 +12,16 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
 from twinloop.faces.opening import check_beside
-from twinloop.faces.telling import against_it, attach, counted, numbered, tell, tell_failed, to_be_flown
+from twinloop.faces.telling import (
+    against_it,
+    attach,
+    counted,
+    numbered,
+    said_against,
+    tell,
+    tell_failed,
+    to_be_flown,
+)
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
 from twinloop.logs import Log
 from twinloop.store import Doing, approve, approved, doing, is_address, listed, opened, shown_name, state
@@ -286,7 +295,7 @@ def unlearnt(campaign: Campaign) -> str:
 
 
 def _against(campaign: Campaign, flight: Experiment, asked: Test | None, read: Log) -> list[str]:
-    return [f"Against this flight: {sentence}" for sentence in against_it(campaign, flight, asked, read)]
+    return said_against(against_it(campaign, flight, asked, read))
 
 
 def in_words(seen: Doing) -> str:
