@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -152,6 +153,74 @@ def test_a_job_that_fails_is_said_and_the_others_go_on(tmp_path, monkeypatch):
     assert [outcome.failure for outcome in outcomes] == ["the motor cut out", None]
     (row,) = summarised(outcomes)
     assert (row["campaigns"], row["failed"]) == (1, 1)
+
+
+FAILING = """
+import twinloop as tl
+
+class Rig(tl.systems.Quadrotor):
+    def run(self, test):
+        failure = {1: RuntimeError("the fuse blew"), 2: OSError("no answer from the port"), 9: KeyboardInterrupt()}
+        if self.seed in failure:
+            raise failure[self.seed]
+        return super().run(test)
+
+def rig(seed):
+    if seed == 0:
+        raise OSError("no such port")
+    if seed == 4:
+        raise ValueError("no such valve")
+    made = Rig(noise=1e-3, seed=seed)
+    made.seed = seed
+    return made
+"""
+
+
+def flown_by_failing(tmp_path, monkeypatch, *words):
+    (tmp_path / "failing.py").write_text(FAILING)
+    monkeypatch.syspath_prepend(tmp_path)
+    changed = [word for name, values in SMALL.items() for word in ("--vary", f"{name}={values[0]}")]
+    store = str(tmp_path / "failing.db")
+    words = (*words, "--experiments", "1", "--presets", "paper", *changed, "--store", store)
+    return invoke("sweep", "failing:rig", *words)
+
+
+@pytest.mark.parametrize("cluster", ["here", "local:1"])
+def test_whatever_a_system_raises_is_said_of_its_seed_and_the_others_are_flown(
+    tmp_path, monkeypatch, cluster
+):
+    if cluster != "here":
+        pytest.importorskip("distributed", reason="needs the extra cluster")
+    done = flown_by_failing(tmp_path, monkeypatch, "--seeds", "0:5", "--cluster", cluster)
+    assert done.exit_code == 1 and isinstance(done.exception, SystemExit)
+    failed = [line.rpartition("seed ")[2] for line in done.stderr.splitlines() if line.startswith("Failed: ")]
+    assert sorted(failed) == [
+        "0: OSError: no such port",
+        "1: RuntimeError: the fuse blew",
+        "2: OSError: no answer from the port",
+        "4: ValueError: no such valve",
+    ]
+    row = next(line for line in done.stdout.splitlines() if line.startswith("failing:rig"))
+    assert re.search(r" +1 +4 +\d", row), "one was flown, four failed"
+    with closing(sqlite3.connect(tmp_path / "failing.db")) as base:
+        ((name,),) = base.execute("select name from campaigns").fetchall()
+    assert name.endswith("seed 3")
+
+
+def test_ctrl_c_while_a_system_runs_stops_the_sweep(tmp_path, monkeypatch):
+    done = flown_by_failing(tmp_path, monkeypatch, "--seeds", "9:12")
+    assert done.exit_code == 130 and "10" not in done.stderr
+
+
+def test_a_system_that_cannot_be_made_any_more_does_not_end_a_sweep_that_is_half_stored(
+    tmp_path, monkeypatch
+):
+    assert flown_by_failing(tmp_path, monkeypatch, "--seeds", "3").exit_code == 0
+    monkeypatch.setattr("failing.rig", lambda seed: 1 / 0 if seed == 3 else Rig(seed))
+    from failing import Rig
+
+    done = flown_by_failing(tmp_path, monkeypatch, "--seeds", "3:4")
+    assert done.exit_code == 1 and "seed 3: ZeroDivisionError" in done.stderr
 
 
 def test_quartiles_are_those_of_the_campaigns(here):

@@ -12,7 +12,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import check_setup
 from twinloop.errors import InvalidInput
 from twinloop.store import listed, opened, shown_name
-from twinloop.sweep.flying import Flown, begun, fly
+from twinloop.sweep.flying import Flown, begun, fly, reason
 from twinloop.sweep.jobs import Job, system_of
 from twinloop.sweep.workers import HERE, finished, threads_on
 
@@ -60,14 +60,18 @@ def sweep(jobs: Sequence[Job], store: str | Path, cluster: str | Client = HERE) 
     done = _finished(store)
     todo = []
     for job in jobs:
-        known = _stored(job, store) if job.name in done else None
-        if known is None:
+        if job.name not in done:
             todo.append(job)
+            continue
+        try:
+            asked = begun(job, system_of(job.system, job.seed), threads=1)
+        except Exception as failure:  # as of a campaign that is flown
+            yield Outcome(job, None, reason(failure), 0.0)
         else:
-            yield Outcome(job, known, None, None)
+            yield Outcome(job, _stored(job, asked, store), None, None)
     for job, flown in finished(partial(fly, threads=threads), todo, cluster):
         if not isinstance(flown, Flown):
-            yield Outcome(job, None, f"{type(flown).__name__}: {flown}", 0.0)
+            yield Outcome(job, None, reason(flown), 0.0)
         elif flown.record is None:
             yield Outcome(job, None, flown.failure, flown.seconds)
         else:
@@ -84,9 +88,8 @@ def _finished(store: str | Path) -> set[str]:
         base.close()
 
 
-def _stored(job: Job, store: str | Path) -> Campaign | None:
+def _stored(job: Job, asked: Campaign, store: str | Path) -> Campaign:
     """The campaign that the store holds, if it is finished; one that is not makes room for nothing and is refused."""
-    asked = begun(job, system_of(job.system, job.seed), threads=1)
     campaign = Campaign.load(store, job.name, read_only=True, threads=1, progress=None)
     where = f"Sweep, store {shown_name(store)}"
     check_setup(campaign.setup, asked.setup, f"{where}: expected the campaign {job.name!r} of this sweep")

@@ -45,9 +45,20 @@ def fly(job: Job, threads: int | None = None) -> Flown:
             campaign = begun(job, system_of(job.system, job.seed), threads)
             campaign.run(system_of(job.system, job.seed), job.experiments)
             controller_to_fly(campaign)
-        except TwinloopError as failure:
-            return Flown(None, str(failure), time.monotonic() - clock)
+        except Exception as failure:  # a system by others may raise anything: the other campaigns go on
+            return Flown(None, reason(failure), time.monotonic() - clock)
     return Flown(campaign.to_record(), None, time.monotonic() - clock)
+
+
+def reason(failure: BaseException) -> str:
+    """Why a job failed, as it is reported; the same on any cluster.
+
+    Args:
+        failure: what was raised. Messages of Twinloop are sentences; others need the name of their kind.
+    """
+    if isinstance(failure, TwinloopError):
+        return str(failure)
+    return f"{type(failure).__name__}: {failure}".removesuffix(": ")
 
 
 def begun(job: Job, system: Any, threads: int | None = None) -> Campaign:

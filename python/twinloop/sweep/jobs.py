@@ -102,7 +102,14 @@ def crossed(
                 f"Sweep: expected names of at most 200 characters, found {job.name!r}; vary fewer options."
             )
     for system in systems:
-        system_of(system, seeds[0])
+        try:
+            system_of(system, seeds[0])
+        except InvalidInput:
+            raise
+        except (
+            Exception
+        ):  # this seed has no system: that is reported when it is flown, and the others are flown
+            pass
     return jobs
 
 
@@ -115,6 +122,7 @@ def system_of(text: str, seed: int) -> Any:
 
     Raises:
         InvalidInput: no such system, or one that does not say of itself what a campaign needs.
+        Exception: whatever else a function that makes a system raises, such as an OSError of a port.
     """
     name, _, rest = text.partition(":")
     if name in BUILT_IN:
@@ -125,7 +133,7 @@ def system_of(text: str, seed: int) -> Any:
     try:
         # A class or a function makes a system of the seed; anything else is one.
         system = found(seed=seed) if isinstance(found, type) or not hasattr(found, "run") else found
-    except (ValueError, TypeError) as failure:
+    except TypeError as failure:
         raise InvalidInput(
             f"System {text!r}: expected a system or a function of seed that makes one, found: {failure}; correct it."
         ) from failure

@@ -45,7 +45,7 @@ def finished(
     """
     if cluster == HERE:
         for task in tasks:
-            yield task, work(task)
+            yield task, _answer(work, task)
         return
     with _client(cluster) as client:
         from distributed import as_completed
@@ -59,6 +59,14 @@ def finished(
                 future.release()
         finally:
             client.cancel(list(futures), force=True)
+
+
+def _answer(work: Callable[[Task], Answer], task: Task) -> Answer | Exception:
+    """What a worker of a cluster gives back: also there one task that fails does not end the others."""
+    try:
+        return work(task)
+    except Exception as failure:
+        return failure
 
 
 def processes(cluster: object) -> int | None:
