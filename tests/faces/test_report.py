@@ -352,6 +352,40 @@ def test_two_campaigns_stand_side_by_side(good, bad, tmp_path):
     assert "good against bad" in (tmp_path / "both.html").read_text(encoding="utf-8")
 
 
+INCOMPARABLE = {
+    "the kind of quality": {"quality": "ise"},
+    "what counts in it": {"weights": {"angle": 2.0}},
+    "the start": {"initial_state": [0.25, 0.0]},
+    "the target": {"target_state": [0.9, 0.0]},
+    "the duration": {"duration": 2.0},
+}
+
+
+@pytest.mark.parametrize("aspect", INCOMPARABLE)
+def test_qualities_of_other_tasks_are_shown_as_what_cannot_be_compared(aspect, tmp_path):
+    for name, changes in (("one", {}), ("other", INCOMPARABLE[aspect])):
+        lives.begun(preset="default", **changes).save(tmp_path / f"{name}.db", name)
+    page = tmp_path / "both.html"
+    answer = run("compare", tmp_path / "one.db", tmp_path / "other.db", "-o", page)
+    assert answer.exit_code == 0, answer.output
+    (row,) = (line for line in answer.stdout.splitlines() if line.startswith(f"{aspect} "))
+    one, other = re.split("  +", row)[1:]
+    assert one != other
+    sentence = f"The qualities of these campaigns cannot be compared: they differ in {aspect}."
+    assert answer.stdout.splitlines()[-1] == sentence and sentence in page.read_text(encoding="utf-8")
+    assert "better" not in answer.stdout
+    assert all(line.split("  ")[0] not in INCOMPARABLE or line == row for line in answer.stdout.splitlines())
+
+
+def test_qualities_of_one_task_are_compared(tmp_path):
+    for seed in (0, 1):
+        lives.begun(preset="default", seed=seed).save(tmp_path / f"{seed}.db", f"seed {seed}")
+    answer = run("compare", tmp_path / "0.db", tmp_path / "1.db")
+    assert answer.exit_code == 0 and "lower is better" in answer.stdout
+    assert "cannot be compared" not in answer.stdout
+    assert not any(line.startswith("the ") for line in answer.stdout.splitlines())
+
+
 def test_campaigns_of_one_name_are_told_apart_by_their_stores(good, bad, tmp_path):
     for campaign, name in ((good, "good"), (bad, "bad")):
         campaign.save(tmp_path / f"{name}.db", "campaign")

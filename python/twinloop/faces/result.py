@@ -57,7 +57,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         "preset": campaign.setup.preset,
         "options": dataclasses.asdict(campaign.options),
         "goal": campaign.setup.goal,
-        "quality": _quality(campaign.setup.quality),
+        "quality": quality_facts(campaign.setup.quality),
         "seed": campaign.setup.seed,
         "interrupted": campaign.interrupted,
         "task": {
@@ -106,8 +106,12 @@ def _cost(cost: Cost) -> dict[str, Any]:
     return {"left" if key == "left_envelope" else key: value for key, value in found.items()}
 
 
-def _quality(quality: Quality) -> dict[str, object]:
-    """What is minimised, and what counts in it."""
+def quality_facts(quality: Quality) -> dict[str, Any]:
+    """What is minimised, and what counts in it.
+
+    Args:
+        quality: of a campaign.
+    """
     counts = [
         {"name": state.name, "unit": state.unit, "weight": weight}
         for state, weight in zip(quality.signals.states, quality.weights.tolist(), strict=True)

@@ -13,6 +13,7 @@ from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture
 from twinloop.faces.files import check_writable
 from twinloop.faces.opening import say_if_changed
+from twinloop.faces.report.alike import not_comparable, task_differences
 from twinloop.faces.report.comparison import compared, comparison, comparison_page
 from twinloop.faces.report.page import source_page, templates
 from twinloop.faces.report.source import source
@@ -92,8 +93,10 @@ def compare(first: str, second: str, names: tuple[str, ...], output: Path | None
     names_shown, answers = [each.name for each in sources], compared(sources)
     if len(set(names_shown)) == 1:  # such as "campaign", which each has that nobody named
         names_shown = [shown_name(where) for where in (first, second)]
-    found = comparison(names_shown, answers)
-    answer({"campaigns": names_shown, "answers": answers}, table(list(found.head), found.rows), as_json)
+    note = not_comparable(list(task_differences([each.campaign.setup for each in sources])))
+    found = comparison(names_shown, answers, note)
+    words = table(list(found.head), found.rows) + (f"\n{note}" if note else "")
+    answer({"campaigns": names_shown, "answers": answers, "not_comparable": note}, words, as_json)
     if output is not None:
         write_whole(output, comparison_page(found))
         click.echo(f"Page: {output}", err=True)

@@ -10,6 +10,7 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.assessment import number_of, predicted_quality
 from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.units import labelled, words
+from twinloop.faces.report.alike import task_differences
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables.table import Table, shown_value
@@ -25,21 +26,33 @@ def compared(sources: Sequence[Source]) -> dict[str, list[object]]:
 
     Args:
         sources: at least one.
+
+    Returns:
+        Also in what their tasks and qualities differ; where they do, no quality is said to be the better one.
     """
-    answers = [dict(_answers(source)) for source in sources]
+    differences = task_differences([source.campaign.setup for source in sources])
+    better = "" if differences else ", lower is better"
+    answers = [dict(_answers(source, better)) for source in sources]
     questions = list(dict.fromkeys(question for each in answers for question in each))
-    return {question: [each.get(question) for each in answers] for question in questions}
+    found = {question: [each.get(question) for each in answers] for question in questions}
+    before = questions.index("twin")
+    return {
+        **{question: found[question] for question in questions[:before]},
+        **differences,
+        **{question: found[question] for question in questions[before:]},
+    }
 
 
-def comparison(names: Sequence[str], found: Mapping[str, Sequence[object]]) -> Table:
+def comparison(names: Sequence[str], found: Mapping[str, Sequence[object]], note: str = "") -> Table:
     """A row a question, a column a campaign.
 
     Args:
         names: of the campaigns.
         found: what they answer.
+        note: on what cannot be compared; empty where everything can.
     """
     rows = [[question, *(shown_value(value) for value in values)] for question, values in found.items()]
-    return Table("comparison", "Side by side", ["", *names], rows)
+    return Table("comparison", "Side by side", ["", *names], rows, note)
 
 
 def comparison_page(table: Table) -> str:
@@ -59,7 +72,7 @@ def comparison_page(table: Table) -> str:
     return text
 
 
-def _answers(source: Source) -> list[Row]:
+def _answers(source: Source, better: str) -> list[Row]:
     campaign = source.campaign
     found = campaign.examine()
     judged = checks(found)
@@ -87,7 +100,7 @@ def _answers(source: Source) -> list[Row]:
     if best is not None:
         predicted, spread = predicted_quality(best, found.experiments)
         rows += [
-            (f"quality predicted{unit}, lower is better", predicted),
+            (f"quality predicted{unit}{better}", predicted),
             (f"± spread{unit}", spread),
             (f"quality flown{unit}", best.measured),
             (
