@@ -157,7 +157,7 @@ def stored(path, preset="paper", **changes):
         "controller": CONTROLLER, "initial_state": [0.0, 0.0], "target_state": [1.0, 0.0], "duration": 1.0,
         "preset": preset, "options": TINY if preset == "paper" else SMALL, "threads": 1, **changes,
     }  # fmt: skip
-    return tl.Campaign(SIGNALS, store=path, **arguments)
+    return tl.Campaign(arguments.pop("signals", SIGNALS), store=path, **arguments)
 
 
 def plain(campaign):

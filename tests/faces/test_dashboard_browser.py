@@ -1,6 +1,7 @@
 """The dashboard in a browser, as people use it: they drop logs on it, approve, and watch what others do."""
 
 import contextlib
+import dataclasses
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +11,22 @@ import pytest
 pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
 pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
 
+import twinloop as tl
 from browser import SIZES, browser, kept, serious
+from conftest import PENDULUM_GAINS
 from dashboards import begun, flight, look, served
+from lives import SIGNALS, stored
+from twinloop.faces.sheet import excitation_words, hold_back_words, reason, unknown_risk
+
+ENVELOPES = ((-2.0, 2.0), (-20.0, 20.0))
+BOUNDED = tl.Signals(
+    states=[
+        dataclasses.replace(state, envelope=envelope)
+        for state, envelope in zip(SIGNALS.states, ENVELOPES, strict=True)
+    ],
+    commands=SIGNALS.commands,
+    dt=SIGNALS.dt,
+)
 
 RUN = """
 import sys, time
@@ -90,6 +105,37 @@ def test_a_log_is_dropped_and_the_page_follows(chromium, tmp_path, size):
         # A refused upload is an answer that the browser reports by itself.
         assert [text for text in said if "422" not in text] == []
     assert len(look(store).experiments) == 2
+
+
+@pytest.mark.parametrize("size", ["desktop", "phone"])
+def test_the_first_test_says_before_it_is_approved_what_is_flown_and_what_it_risks(chromium, tmp_path, size):
+    campaign = stored(tmp_path / "first.db", preset="default", signals=BOUNDED)
+    first = campaign.test(PENDULUM_GAINS)
+    campaign.close()
+    with served(tmp_path / "first.db") as address, shown(chromium, address, size) as (page, said):
+        page.get_by_role("heading", name="Test 0").wait_for()
+        card = " ".join(page.locator("article.test").inner_text().split())
+        before = card[: card.index("Approve")]
+        assert reason(first, flown=False) in before
+        assert "state start target inner range outer range angle (rad) 0 1 " in before
+        assert excitation_words(first, "test-0.csv") in before and "% of a command's range" in before
+        assert hold_back_words(first) and hold_back_words(first) in before
+        assert f"Risk of leaving the envelope: {unknown_risk(first)}" in before
+        kept(page, f"dashboard-first-{size}")
+        assert serious(page) == [] and said == []
+        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+        assert wide[0] <= wide[1]
+
+
+def test_what_is_said_while_a_test_is_planned_goes_once_it_is_planned(chromium, tmp_path):
+    store = begun(tmp_path / "hover.db")
+    with served(store) as address, shown(chromium, address) as (page, _):
+        page.get_by_role("heading", name="Test 1").wait_for()
+        page.get_by_role("button", name="Plan the next test").click()
+        page.get_by_text("Learning, and planning the next test.").wait_for()
+        page.get_by_role("heading", name="Test 2").wait_for(timeout=60_000)
+        page.get_by_text("Up to date.").wait_for()
+        assert page.locator("#said").inner_text() == ""
 
 
 def test_a_log_that_is_chosen_is_told_too(chromium, tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
+from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import to_type, two_digits
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
@@ -108,14 +109,9 @@ def unknown_risk(test: Test) -> str:
             " controller."
         )
     signals = test.family.signals
-    most = np.abs(test.excitation).max(axis=0)
-    shares = [
-        100.0 * float(size) / (command.bounds[1] - command.bounds[0])
-        for size, command in zip(most, signals.commands, strict=True)
-    ]
     text = (
-        "not estimated before the first flight. It is the risk of the controller with an excitation of at most"
-        f" {two_digits(max(shares))} % of a command's range"
+        "not estimated before the first flight. It is the risk of the controller with an excitation of"
+        f" {_at_most(test, test.excitation)}"
     )
     ranges = {} if test.hold_back is None else test.hold_back.ranges(signals)
     if ranges:
@@ -123,6 +119,57 @@ def unknown_risk(test: Test) -> str:
     if unbounded := [name for name in signals.state_names if name not in ranges]:
         text += f"; it does not depend on {_listed(unbounded)}"
     return f"{text}."
+
+
+def excitation_words(test: Test, file: str) -> str:
+    """What is added to the commands, and where it stands.
+
+    Args:
+        test: to be flown.
+        file: where its columns are.
+    """
+    if test.excitation is None:
+        return "Excitation of the commands: none."
+    return (
+        f"Excitation of the commands: a row a period in {file}, {_at_most(test, test.excitation)}, added before the"
+        " bounds."
+    )
+
+
+def hold_back_words(test: Test) -> str:
+    """How a person's own program holds the excitation back; empty where nothing does.
+
+    Args:
+        test: to be flown.
+    """
+    if not hold_back_ranges(test):
+        return ""
+    return (
+        "Scale it each period by the readings: the full row while every state is in its inner range, nothing once one"
+        " has left its outer range, linear in between; the state with the smallest factor decides."
+    )
+
+
+def hold_back_ranges(test: Test) -> dict[str, tuple[str, str]]:
+    """Inner and outer range of each state by which the excitation is held back, by name; empty where nothing does.
+
+    Args:
+        test: to be flown.
+    """
+    if test.excitation is None or test.hold_back is None:
+        return {}
+    return {
+        name: (_range(ranges["full"]), _range(ranges["none"]))
+        for name, ranges in test.hold_back.ranges(test.family.signals).items()
+    }
+
+
+def _at_most(test: Test, excitation: Floats) -> str:
+    shares = [
+        100.0 * float(size) / (command.bounds[1] - command.bounds[0])
+        for size, command in zip(np.abs(excitation).max(axis=0), test.family.signals.commands, strict=True)
+    ]
+    return f"at most {two_digits(max(shares))} % of a command's range"
 
 
 def _listed(names: list[str]) -> str:
@@ -171,19 +218,15 @@ def facts(
 
 def _held_back(test: Test, file: str) -> list[str]:
     """How a person's own program holds the excitation back; nothing where nothing does."""
-    if test.excitation is None or test.hold_back is None:
+    ranges = hold_back_ranges(test)
+    if not ranges:
         return []
     units = {state.name: state.unit for state in test.family.signals.states}
-    rows = [
-        [name, _range(ranges["full"]), _range(ranges["none"]), units[name]]
-        for name, ranges in test.hold_back.ranges(test.family.signals).items()
-    ]
+    rows = [[name, inner, outer, units[name]] for name, (inner, outer) in ranges.items()]
     return [
         "",
-        f"Scale it each period by the readings: the full row while every state is in its inner"
-        f" range, nothing once one has left its outer range, linear in between; the state with the smallest"
-        f" factor decides. {file} has the rows to be scaled. For a program that cannot do this, set hold_back = false"
-        " under [options] and begin a new campaign: then the excitation stays small.",
+        f"{hold_back_words(test)} {file} has the rows to be scaled. For a program that cannot do this, set hold_back ="
+        " false under [options] and begin a new campaign: then the excitation stays small.",
         "",
         table(["state", "inner range", "outer range", "unit"], rows),
     ]
@@ -234,7 +277,6 @@ def sheet(
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
     ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
     states = [[state.name, start, target, state.unit] for state, start, target in ends]
-    added = "none" if test.excitation is None else f"a row a period in {file}, added before the bounds"
     lines = [
         f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
         *([advice] if advice else []),
@@ -243,7 +285,7 @@ def sheet(
         "",
         table(["state", "start", "target", "unit"], states),
         "",
-        f"Excitation of the commands: {added}.",
+        excitation_words(test, file),
         *_held_back(test, file),
     ]
     if test.predicted is not None and predicted is not None:

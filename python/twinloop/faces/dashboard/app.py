@@ -27,12 +27,21 @@ from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.opening import changed_since
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
-from twinloop.faces.sheet import columns, sheet
+from twinloop.faces.sheet import (
+    columns,
+    excitation_words,
+    hold_back_ranges,
+    hold_back_words,
+    reason,
+    sheet,
+    unknown_risk,
+)
 from twinloop.faces.telling import numbered, to_be_flown
 from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
 from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
+from twinloop.test import Test
 
 MOST_WORDS = 10_000
 """Bytes of what a form says."""
@@ -223,8 +232,12 @@ class Pages:
                     if test.risk is None
                     else risk_words(test.risk, campaign.setup.predicted_flights, bounded),
                     "risk_of": risk_of_what(bounded),
+                    "risk_unknown": unknown_risk(test) if test.risk is None else None,
                     "advice": advice,
-                    "reason": test.reason,
+                    "reason": reason(test, flown=bool(campaign.history)),
+                    "ends": _ends(test),
+                    "excitation": excitation_words(test, f"test-{test.number}.csv"),
+                    "hold_back": hold_back_words(test),
                     "approved": may.get(test.number) if test.number is not None else None,
                 }
                 for test in to_be_flown(campaign)
@@ -264,6 +277,24 @@ class Pages:
             path = Path(folder) / "columns.csv"
             write_columns(path, columns(test, predicted))
             return path.read_text("utf-8")
+
+
+def _ends(test: Test) -> list[list[str]]:
+    """Where a test starts and should end, and the ranges by which its excitation is held back, as a table."""
+    ranges = hold_back_ranges(test)
+    head = ["state", "start", "target", *(("inner range", "outer range") if ranges else ())]
+    ends = zip(
+        test.family.signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True
+    )
+    rows = [
+        [
+            f"{state.name} ({state.unit})" if state.unit not in ("", "1") else state.name,
+            *(f"{value:.4g}" for value in (start, target)),
+            *(ranges.get(state.name, ("any", "any")) if ranges else ()),
+        ]
+        for state, start, target in ends
+    ]
+    return [head, *rows]
 
 
 async def _body(request: Request, most: int) -> bytes:

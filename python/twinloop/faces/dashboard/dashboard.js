@@ -5,7 +5,7 @@
   if (at === undefined) return;
   const get = (id) => document.getElementById(id);
   const frame = get("report");
-  let state = null, busy = false;
+  let state = null, busy = false, passing = false;
 
   const say = (text, bad) => {
     const said = get("said");
@@ -15,10 +15,12 @@
   const send = async (path, body) => {
     say("");
     let done = false;
+    passing = false;
     try {
       const answer = await fetch(at + path, { method: "POST", body });
       const found = await answer.json();
       done = answer.ok;
+      passing = answer.status === 202;  // it goes on behind, and what was said of it holds only as long
       say(found.said || found.failed, !done);
     } catch (failure) {
       say("The dashboard does not answer: " + failure.message, true);
@@ -44,6 +46,16 @@
     input.addEventListener("change", () => { if (input.files.length) take(input.files[0]); input.value = ""; });
   };
 
+  // The first cells are heads: of their row, or of their columns where all are.
+  const line = (part, cells, heads) => {
+    const row = part.insertRow();
+    cells.forEach((text, place) => {
+      const cell = document.createElement(place < heads ? "th" : "td");
+      if (place < heads) cell.scope = heads === cells.length ? "col" : "row";
+      cell.textContent = text;
+      row.append(cell);
+    });
+  };
   const card = (test) => {
     const part = get("test").content.cloneNode(true), one = (name) => part.querySelector(name);
     const path = "/tests/" + test.number;
@@ -55,12 +67,16 @@
     if (test.predicted !== null) rows.push(["quality predicted", (test.predicted + (test.spread === null ? "" : " ± " + test.spread) + " " + test.unit).trim()]);
     if (test.risk !== null) rows.push(["risk of " + test.risk_of, test.risk]);
     for (const [name, value] of rows) {
-      const row = one("tbody").insertRow(), head = document.createElement("th");
-      head.scope = "row";
-      head.textContent = name;
-      row.append(head);
-      row.insertCell().textContent = value;
+      line(one(".set tbody"), [name, value], 1);
     }
+    const [titles, ...states] = test.ends;
+    line(one(".ends thead"), titles, titles.length);
+    for (const state of states) line(one(".ends tbody"), state, 1);
+    one(".excitation").textContent = test.excitation;
+    one(".held").textContent = test.hold_back;
+    one(".held").hidden = !test.hold_back;
+    one(".risk").textContent = test.risk_unknown === null ? "" : "Risk of " + test.risk_of + ": " + test.risk_unknown;
+    one(".risk").hidden = test.risk_unknown === null;
     one(".sheet").href = at + path + "/sheet";
     one(".columns").href = at + path + "/columns.csv";
     one(".approve").hidden = test.approved !== null;
@@ -106,6 +122,10 @@
       const now = await (await fetch(at + "/state")).json();
       get("ask").disabled = now.working !== null;
       get("status").textContent = now.working === null ? "Up to date." : now.working;
+      if (passing && now.working === null) {
+        say("");
+        passing = false;
+      }
       if (now.failed) say(now.failed, true);
       if (now.state !== state) {
         await show();
