@@ -127,7 +127,9 @@ def squares(states: Floats, others: Floats, signals: Signals) -> Floats:
 
 
 def left(free: float, frozen: float, noise: float) -> bool:
-    """Whether a free run does not follow its flight. One in which nothing ever moves is followed by nothing.
+    """Whether a free run does not follow its flight. One in which no reading ever moves is followed by nothing.
+
+    Where commands moved, that is no merit of a model: the system was off, or its sensors were.
 
     Args:
         free: its mean square error; infinite where it diverges.

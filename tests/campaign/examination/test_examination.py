@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
-from twinloop.campaign.examination.checking import _damping, _delay, _of_controller, _of_target
+from twinloop.campaign.examination.checking import _damping, _delay, _of_controller, _of_following, _of_target
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
 from twinloop.campaign.examination.data import movements
 from twinloop.campaign.examination.reaching import ending
@@ -142,6 +143,53 @@ def test_a_twin_of_a_pendulum_passes_and_says_how_sure_it_is(good):
     names = [check.name for check in checks]
     assert {"follows", "remarks", "unseen-flight", "band", "whiteness", "commands", "stable"} <= set(names)
     assert all(check.sentence and check.subject in ("twin", "controller") for check in checks)
+
+
+def from_readings(readings, commands):
+    """What the check `follows` says of a twin that was learnt from one log alone, and its serious remarks."""
+    n = len(commands)
+    log = tl.Trajectory(lives.SIGNALS.dt * np.arange(n + 1), readings, commands)
+    campaign = lives.made(duration=n * lives.SIGNALS.dt)
+    campaign.attach(log)
+    remarks = {remark.code for remark in campaign.twin.remarks if remark.serious}
+    return campaign, next(check for check in campaign.checks() if check.name == "follows"), remarks
+
+
+def test_a_twin_that_stays_where_a_log_stays_follows_it_and_has_learnt_nothing():
+    campaign, follows, remarks = from_readings(np.tile([0.3, 0.0], (61, 1)), np.full((60, 1), 0.5))
+    assert (campaign.rmse == 0.0).all() and campaign.twin.follows
+    assert follows.passed and follows.value == 0.0
+    assert "Nothing moves in the 1 experiment" in str(follows) and "nothing can be learnt" in str(follows)
+    assert "error" not in str(follows) and remarks == {"nothing-moved"}
+    assert not campaign.checks().twin_passed
+
+
+def test_what_never_answers_its_commands_is_followed_by_nothing():
+    stream = np.random.default_rng(1)
+    campaign, follows, remarks = from_readings(
+        np.tile([0.3, 0.0], (61, 1)), stream.uniform(-1.0, 1.0, (60, 1))
+    )
+    assert not campaign.twin.follows and not follows.passed
+    assert "No reading moves" in str(follows) and "error" not in str(follows)
+    assert "never-moved" in remarks and "nothing-moved" not in remarks
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_is_not_said_to_be_followed(seed):
+    stream = np.random.default_rng(seed)
+    _, follows, remarks = from_readings(
+        [0.3, 0.0] + 1e-2 * stream.normal(size=(151, 2)), stream.uniform(-1.0, 1.0, (150, 1))
+    )
+    assert "only-noise" in remarks and not follows.passed
+
+
+@pytest.mark.parametrize(("errors", "passed"), [([0.1, 0.1, 1.1], True), ([0.1, 1.1, 1.1], False)])
+def test_what_is_followed_no_better_than_by_a_model_that_never_moves_does_not_pass(good, errors, passed):
+    rows = [SimpleNamespace(closed_loop=0.1, normalised=error) for error in errors]
+    twin = SimpleNamespace(errors=rows, follows=True, remarks=())
+    check = _of_following(SimpleNamespace(twin=twin, learnt=3, experiments=good.experiments))
+    assert check.passed is passed and check.value == 1.1
+    assert ("no better than a model that never moves" in str(check)) is not passed
 
 
 def test_nothing_is_said_of_an_envelope_that_nobody_declared():

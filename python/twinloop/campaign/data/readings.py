@@ -25,6 +25,8 @@ WHITE = 1.5
 """Von Neumann's ratio, 2 for white noise and near 0 for what moves smoothly, above which nothing else is seen."""
 SPIKES = 0.01
 """Share of the readings, and one more, that may be wrong at each end."""
+ONLY_NOISE = "only-noise"
+"""Code of the remark that readings contain nothing else."""
 SOME = 20
 """Readings of a run at least that tell noise from motion."""
 
@@ -76,7 +78,7 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
     enough = any(len(run.states) >= SOME for run in runs)
     if moved and enough and all(ratio([_clipped(run.states[:, i]) for run in runs]) > WHITE for i in moved):
         yield serious(
-            "only-noise",
+            ONLY_NOISE,
             "Readings change from row to row as much as over whole runs: they contain only noise; check"
             " the sensors, their units, and that the period is not far too long.",
         )
@@ -91,6 +93,24 @@ def _taken(one: Derived, signals: Signals) -> str:
         "has their noise, which a law can take for motion: declare it"
         f" (State({name!r}, …, derivative_of={of!r})), in the unit of {of} a second, and the twin computes it, too"
     )
+
+
+def still(run: Trajectory) -> bool:
+    """Whether no reading of a run differs from its first.
+
+    Args:
+        run: that was recorded.
+    """
+    return bool((run.states == run.states[0]).all())
+
+
+def at_rest(run: Trajectory) -> bool:
+    """Whether neither readings nor commands of a run move: a model that stays where it is follows it.
+
+    Args:
+        run: that was recorded.
+    """
+    return still(run) and bool((run.commands == run.commands[:1]).all())
 
 
 def froze(readings: Floats) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import two_digits
 from twinloop._ground.times import shown_time
+from twinloop.campaign.data.readings import ONLY_NOISE, still
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.delay_borne import MOST
 from twinloop.campaign.examination.examination import Examination
@@ -48,15 +49,8 @@ def checks(found: Examination) -> Checks:
 
 
 def _of_twin(found: Examination) -> Iterator[Check]:
-    twin, runs = found.twin, found.learnt
-    worst = max((row.normalised for row in twin.errors[:runs]), default=math.inf)
-    follows = twin.follows
-    yield Check(
-        "follows", "twin", worst, None, follows, True,
-        f"In free run the twin {_follows(follows, worst)} the"
-        f" {runs} experiment{'s' * (runs != 1)} that it was learnt from: {_error(worst)} (0 is perfect, 1 a"
-        " model that never moves).",
-    )  # fmt: skip
+    twin = found.twin
+    yield _of_following(found)
     grave = [remark for remark in twin.remarks if remark.serious]
     yield Check(
         "remarks", "twin", float(len(grave)), 0.0, not grave, True,
@@ -71,6 +65,41 @@ def _of_twin(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
     yield from _of_unseen(found)
     yield from _of_innovations(found)
+
+
+def _of_following(found: Examination) -> Check:
+    """Whether the twin follows what it was learnt from; in noise, or at rest, there is nothing to follow."""
+    twin, runs = found.twin, found.learnt
+    rows = twin.errors[:runs]
+    # A run that stays exactly where the readings stay has no error, whatever it is divided by.
+    off = [0.0 if row.closed_loop == 0.0 else row.normalised for row in rows]
+    worst = max(off, default=math.inf)
+    learnt = f"the {runs} experiment{'s' * (runs != 1)} that it was learnt from"
+
+    def check(passed: bool, sentence: str) -> Check:
+        return Check("follows", "twin", worst, None, passed, True, sentence)
+
+    if worst == 0.0 and all(still(each.trajectory) for each in found.experiments[:runs]):
+        if twin.follows:
+            return check(
+                True,
+                f"Nothing moves in {learnt}: the twin stays where the readings stay, and nothing can be learnt from"
+                " them.",
+            )
+        return check(
+            False,
+            f"No reading moves in {learnt}, though commands do: there is nothing that a twin could follow.",
+        )
+    error = f"{_error(worst)} (0 is perfect, 1 a model that never moves)"
+    if twin.follows and any(remark.code == ONLY_NOISE for remark in twin.remarks):
+        return check(
+            False, f"There is no motion beside noise that the twin could follow in {learnt}: {error}."
+        )
+    if twin.follows and 2 * sum(each >= 1.0 for each in off) > len(off):
+        return check(
+            False, f"In free run the twin follows {learnt} no better than a model that never moves: {error}."
+        )
+    return check(twin.follows, f"In free run the twin {_follows(twin.follows, worst)} {learnt}: {error}.")
 
 
 def _follows(follows: bool, worst: float) -> str:

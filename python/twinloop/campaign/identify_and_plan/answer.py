@@ -13,6 +13,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.streams import Unit
+from twinloop.campaign.data.readings import at_rest
 from twinloop.campaign.data.sent import in_pulses
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
@@ -152,7 +153,11 @@ def _lost(
     seen = np.square(identified.sensors(len(scales)) / scales)
     free, frozen = followed.free[0], followed.frozen
     rows = zip(free.tolist(), frozen.tolist(), strict=True)
-    lost = np.array([left(*row, float(seen.mean())) for row in rows])
+    level = float(seen.mean())
+    lost = np.array([left(*row, level) for row in rows])
+    for j, run in enumerate(flights):
+        if at_rest(run.trajectory):
+            lost[j] = not free[j] <= level
     model, limits = identified.members[0], setup.limits
     short = [j for j in _shortened(identified, followed, flights, setup) if not lost[j]]
     if short:

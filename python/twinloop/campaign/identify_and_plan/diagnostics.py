@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.odd_one_out import odd_one_out
-from twinloop.campaign.data.readings import suspicious
+from twinloop.campaign.data.readings import at_rest, suspicious
 from twinloop.campaign.data.rows import Shifted
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
@@ -86,6 +86,7 @@ def diagnostics_of(
         *odd,
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
+        *_nothing_moved(recorded),
         *from_other_controllers(found.others),
         *_unmoved(found.unmoved),
     ]
@@ -108,6 +109,17 @@ def _odd_log(
     if logs:
         names = called(experiments)
         yield from odd_one_out([recorded[place] for place in logs], [names[place] for place in logs], signals)
+
+
+def _nothing_moved(recorded: Sequence[Trajectory]) -> Iterator[Remark]:
+    """That all runs are of a system at rest: what stays where it is follows them, and is no twin of anything."""
+    if all(map(at_rest, recorded)):
+        which = "the run" if len(recorded) == 1 else f"any of the {len(recorded)} runs"
+        yield serious(
+            "nothing-moved",
+            f"Neither readings nor commands move in {which}: nothing can be learnt. Check that the log is of a run, and"
+            " record one in which the commands move.",
+        )
 
 
 def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
