@@ -48,6 +48,7 @@ from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard import Guard, Guarded
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
+from twinloop.planning.proposal import Fared
 from twinloop.remarks import warn
 from twinloop.signals import Signals
 from twinloop.systems import System
@@ -497,7 +498,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         known = self._method.knowledge(self._book)
         twins = known.twins_before()
         innovations = known.innovations(self._workers)
-        return Examination(self, Earlier(twins, self._error_on, innovations, known.rivals()))
+        return Examination(self, Earlier(twins, self._error_on, innovations, known.rivals(), self._fared))
 
     def checks(self) -> Checks:
         """Whether the twin can be trusted and the controller flown, check by check; printable.
@@ -737,6 +738,9 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     def _error_on(self, model: _core.Model, run: Experiment) -> float:
         return whole_error(model, run, self.setup, self._workers)
+
+    def _fared(self, genes: Floats) -> Fared:
+        return standing.fared(self._book, genes, excited=False)
 
     @contextmanager
     def _at_work(self, name: str = "campaign", experiments: int | None = None) -> Iterator[None]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
@@ -160,6 +161,11 @@ def _not_tested(
         for use in uses
         if use.beyond_flown
     ]
+    if best.risk is None and is_bounded(signals):
+        said.append(
+            "How probably it leaves the envelope: there is no committee that estimates it, and a few flights inside do"
+            " not show it."
+        )
     bare = [use.name for use in uses if use.envelope is None]
     if bare:
         said.append(

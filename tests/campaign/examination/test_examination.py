@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import lives
 import twinloop as tl
-from conftest import pendulum_step
+from conftest import TINY, pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.checking import _damping, _delay, _of_controller, _of_following, _of_target
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
@@ -19,6 +19,7 @@ from twinloop.campaign.examination.data import movements
 from twinloop.campaign.examination.reaching import ending
 from twinloop.campaign.examination.use import strongest_commands
 from twinloop.law.linear.margins import LoopMargins
+from twinloop.planning.proposal import Fared
 
 STREAM = np.random.default_rng(7)
 
@@ -242,6 +243,7 @@ def test_gains_have_flown_in_whichever_test_they_flew(good):
         found.best, found.experiments = dataclasses.replace(run.test.quiet(), number=99), runs
         (check,) = (check for check in _of_controller(found) if check.name == "flown")
         assert sentence in check.sentence and check.passed == (runs == (run,))
+        assert check.binding == (runs != good.experiments[1:])  # what has not flown may still fly well
 
 
 def test_the_least_movement_is_that_of_the_state_that_moved_least_in_its_best_flight(good):
@@ -272,6 +274,48 @@ def test_a_binding_check_that_could_not_be_made_does_not_hold(good):
     assert [check.name for check in unmade] == ["stable", "sensitivity", "delay"]
     assert "expected a slope, found none" in unmade[0].sentence
     assert all(check.value is None and check.verdict == "failed" for check in unmade)
+
+
+@pytest.mark.parametrize(
+    ("fared", "planned", "verdict", "said"),
+    [
+        (Fared(0, 0), 11.9, "failed", "have not flown"),
+        (Fared(1, 0), 11.9, "passed", "their only flight"),
+        (Fared(3, 0), 11.9, "passed", "each of their 3 flights"),
+        (Fared(3, 1), 11.9, "failed", "1 of their 3 flights"),
+        (Fared(3, 0), 12.1, "failed", "the twin predicts that these gains leave it"),
+    ],
+)
+def test_without_a_committee_flights_of_the_gains_decide_on_the_envelope(good, fared, planned, verdict, said):
+    """Of a rate within ± 12 rad/s, on the twin, too."""
+    found = good.examine()
+    found.planned = tl.Trajectory([0.0, 0.05], [[0.0, 0.0], [0.0, planned]], [[0.0]])
+    found.best = dataclasses.replace(found.best.quiet(), risk=None)
+    found._fared = lambda genes: fared
+    (check,) = (check for check in _of_controller(found) if check.name == "envelope")
+    assert (check.verdict, check.value, check.binding) == (verdict, None, True) and said in check.sentence
+    assert ("Not made" in check.sentence) == (verdict == "failed")
+
+
+@pytest.mark.parametrize(("most", "kept"), [(5.0, True), (2.0, False)])
+def test_gains_of_the_paper_are_certified_for_the_envelope_only_by_flights_inside(most, kept):
+    """The swing turns at 3.7 rad/s, and nothing but its flights says so."""
+    angle, rate = lives.SIGNALS.states
+    states = [angle, dataclasses.replace(rate, envelope=(-most, most))]
+    signals = tl.Signals(states, lives.SIGNALS.commands, lives.SIGNALS.dt)
+    campaign = tl.Campaign(
+        signals, controller=lives.CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0,
+        threads=1, preset="paper", options=TINY,
+    )  # fmt: skip
+    lives.flown(campaign, lives.PLANT)
+    assert campaign.experiments[0].kept_envelope == kept
+    found = campaign.certificate()
+    checks = {check.name: check for check in found.checks}
+    assert found.best.risk is None
+    for name in ("envelope", "flown"):
+        assert checks[name].binding and checks[name].passed == kept
+        assert (checks[name].sentence in found.refusals) != kept
+    assert any("no committee that estimates it" in sentence for sentence in found.not_tested)
 
 
 HEATED = tl.Signals(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from twinloop._experiment.envelope import is_bounded
+from twinloop._experiment.envelope import is_bounded, outside, usages_of
 from twinloop._ground.texts import two_digits
 from twinloop._ground.times import shown_time
 from twinloop.campaign.data.readings import ONLY_NOISE, still
@@ -15,6 +15,8 @@ from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.reaching import REACHED, Ending
 from twinloop.law.linear.margins import LoopMargins
 from twinloop.planning.leaving import risk_words
+from twinloop.planning.proposal import Fared
+from twinloop.test import Test
 
 LEFT = 0.1
 """Error on a flight that was not learnt, over that of a model that never moves, above which a twin is not believed."""
@@ -237,23 +239,50 @@ def _of_controller(found: Examination) -> Iterator[Check]:
             "no-envelope", "controller", None, None, False, False,
             "No envelope is declared: whether a flight stays where it is safe was not checked.",
         )  # fmt: skip
-    if best.risk is not None:
-        safe = best.risk <= RISK
-        name, happens = ("envelope", "leaves the envelope") if bounded else ("divergence", "diverges")
-        yield Check(
-            name, "controller", best.risk, RISK, safe, True,
-            f"The probability that it {happens} is"
-            f" {risk_words(best.risk, found.setup.predicted_flights, bounded)} according to the committee, to gusts as"
-            f" the flights felt them and to flights of these gains; at most {100.0 * RISK:g} % is allowed.",
-        )  # fmt: skip
+    yield from _of_leaving(found, best, bounded)
     kept = any(run.kept_envelope for run in found.best_flights)
     completed = f"completed a flight{' within the envelope' * bounded}"
     not_kept = f"not {completed}" if found.best_flights else "not flown yet"
     yield Check(
-        "flown", "controller", None, None, kept, False, f"These gains have {completed if kept else not_kept}.",
+        "flown", "controller", None, None, kept, bool(found.best_flights),
+        f"These gains have {completed if kept else not_kept}.",
     )  # fmt: skip
     if found.ending is not None:
         yield _of_target(found.ending)
+
+
+def _of_leaving(found: Examination, best: Test, bounded: bool) -> Iterator[Check]:
+    if best.risk is not None:
+        name, happens = ("envelope", "leaves the envelope") if bounded else ("divergence", "diverges")
+        yield Check(
+            name, "controller", best.risk, RISK, best.risk <= RISK, True,
+            f"The probability that it {happens} is"
+            f" {risk_words(best.risk, found.setup.predicted_flights, bounded)} according to the committee, to gusts as"
+            f" the flights felt them and to flights of these gains; at most {100.0 * RISK:g} % is allowed.",
+        )  # fmt: skip
+    elif bounded:
+        yield _by_flights(found.fared, _predicted_to_leave(found))
+
+
+def _predicted_to_leave(found: Examination) -> bool:
+    flight = found.planned
+    return flight is not None and bool(outside(usages_of(found.signals, flight.states)).any())
+
+
+def _by_flights(fared: Fared, predicted_to_leave: bool) -> Check:
+    """Without a committee flights of the same gains have to speak for them; none may leave, on the twin neither."""
+    unknown = "Not made: the probability that it leaves the envelope. No committee has judged it, and"
+    each = "their only flight" if fared.flights == 1 else f"each of their {fared.flights} flights"
+    if not fared.flights:
+        sentence = f"{unknown} these gains have not flown: fly them."
+    elif fared.left:
+        sentence = f"{unknown} in {fared} these gains did not keep the envelope to the end."
+    elif predicted_to_leave:
+        sentence = f"{unknown} the twin predicts that these gains leave it, which kept it in {each}."
+    else:
+        sentence = f"These gains have kept the envelope in {each}. No committee has judged how probably they leave it."
+    kept = fared.flights > 0 and not fared.left and not predicted_to_leave
+    return Check("envelope", "controller", None, RISK, kept, True, sentence)
 
 
 def _of_target(end: Ending) -> Check:

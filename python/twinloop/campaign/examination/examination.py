@@ -50,6 +50,7 @@ from twinloop.law.linear.friction import has_friction, sliding
 from twinloop.law.linear.margins import Loops, Margins, margins_of
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.twin import Twin
+from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory, continued
 
@@ -67,12 +68,14 @@ class Earlier:
         innovations: of each experiment that was learnt, as far as it was (n + 1, n_x), whitened; None where there are
             none.
         rivals: sums of terms that were considered, the chosen ones among them.
+        fared: how some gains (size,) have fared so far, failures included.
     """
 
     twins: Sequence[TwinBefore]
     error: Callable[[_core.Model, Experiment], float]
     innovations: Sequence[Floats] | None
     rivals: Sequence[Rival]
+    fared: Callable[[Floats], Fared]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +133,7 @@ class Examination:
         self.experiments: tuple[Experiment, ...] = campaign.experiments
         self.names = called(self.experiments)
         self.twin: Twin = campaign.twin
-        self.twins_before, self._error = earlier.twins, earlier.error
+        self.twins_before, self._error, self._fared = earlier.twins, earlier.error, earlier.fared
         self.innovations = earlier.innovations
         self.rivals = tuple(earlier.rivals)
         self.best: Test | None = None
@@ -386,6 +389,11 @@ class Examination:
         return tuple(
             run for run in self.experiments if run.test is not None and run.test.genes.tobytes() == genes
         )
+
+    @cached_property
+    def fared(self) -> Fared:
+        """How the gains of the controller to fly have fared; without an excitation, where they have flown so."""
+        return Fared(0, 0) if self.best is None else self._fared(self.best.genes)
 
     @cached_property
     def best_flown(self) -> Experiment | None:
