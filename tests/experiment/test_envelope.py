@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop._experiment.envelope import gone_from, outside, readings_leave
+import twinloop as tl
+from twinloop._experiment.envelope import band_outside, gone_from, outside, readings_leave
 from twinloop.planning.judging import risk
 
 
@@ -36,3 +37,24 @@ def test_a_flight_is_gone_from_where_two_and_most_of_what_is_left_are_outside(us
 def test_an_overshoot_comes_back():
     overshoot = np.array([0.2, 1.2, 1.3, 0.9, 0.3, 0.2, 0.1])
     assert readings_leave(overshoot) and gone_from(overshoot) is None
+
+
+TURN = 2.0 * math.pi
+YAW = tl.State("yaw", "rad", scale=3.14, periodic=True, envelope=(-1.0, 2.0))
+
+
+@given(st.floats(-3.0, 4.0), st.floats(0.0, 4.0), st.integers(-3, 3))
+def test_a_band_of_an_angle_is_outside_where_some_angle_between_its_ends_is(low, width, turns):
+    values = low + np.linspace(0.0, width, 400)
+    beyond = np.abs((values - 0.5 + math.pi) % TURN - math.pi) - 1.5
+    if np.abs(beyond[[0, -1]]).min() > 0.02:  # nearer a bound, the samples do not decide
+        found = band_outside(YAW, np.array([low + turns * TURN]), np.array([low + width + turns * TURN]))
+        assert found.tolist() == [bool((beyond > 0.0).any())]
+
+
+def test_a_band_that_leads_from_turn_to_turn_through_what_is_outside_is_outside():
+    wide = tl.State("yaw", "rad", scale=3.14, periodic=True, envelope=(-3.0, 3.0))
+    low, high = np.array([2.9, 2.9, np.nan, -3.0]), np.array([3.4, 2.95, 0.0, 3.0])
+    assert band_outside(wide, low, high).tolist() == [True, False, True, False]
+    straight = tl.State("height", "m", scale=1.0, envelope=(-3.0, 3.0))
+    assert band_outside(straight, low + TURN, high + TURN).all()

@@ -61,6 +61,14 @@ def test_a_band_that_leaves_the_envelope_is_said(campaign):
     assert "from 0.65 s on, that of rate leaves its envelope at 0.15 s:" in said(campaign, both)
 
 
+def test_a_band_a_turn_away_is_inside_where_its_angle_is():
+    angle = tl.State("angle", "rad", scale=3.0, envelope=(-1.0, 1.5), periodic=True)
+    signals = replace(SIGNALS, states=[angle, SIGNALS.states[1]])
+    turn = 2.0 * np.pi
+    assert leaving(signals, predicted(low=turn - 0.4, high=turn - 0.2)) == {}
+    assert leaving(signals, predicted(low=turn - 0.4, high=turn + 1.6)) == {"angle": (0.0, 1.0)}
+
+
 def test_a_twin_that_is_not_reliable_is_said_with_the_first_reason(campaign):
     against = [serious("free-run", "It misses angle."), serious("unmoved", "Nothing drives rate.")]
     line = "\nThe twin is not reliable yet (free-run, unmoved): It misses angle. twinloop show rig.db has the whole.\n"

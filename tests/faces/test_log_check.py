@@ -247,3 +247,31 @@ def test_of_a_rate_that_no_sensor_reads_nothing_is_said_that_its_state_explains(
     noisy = np.linspace(0.0, 0.05, 60) + 0.003 * np.random.default_rng(0).standard_normal(60)
     said = checked([f"{0.1 * k:.1f},{noisy[k]},{k % 3 - 1}" for k in range(60)])
     assert said.exit_code == 0 and "little" not in said.stdout
+
+
+def test_an_angle_that_was_logged_a_turn_away_is_inside_its_envelope():
+    yaw = tl.State("yaw", "rad", scale=3.14, periodic=True, envelope=(-1.0, 1.0))
+    signals = tl.Signals(
+        [yaw, tl.State("rate", "rad/s", 2.0, derivative_of="yaw")],
+        [tl.Command("torque", "N m", (-1.0, 1.0))],
+        dt=0.05,
+    )
+    t = 0.05 * np.arange(201)
+    noise = 1e-3 * np.random.default_rng(0).normal(size=(201, 2))
+    states = (
+        np.stack([np.mod(-0.3 + 0.2 * np.sin(0.8 * t), 2.0 * np.pi), 0.16 * np.cos(0.8 * t)], axis=1) + noise
+    )
+    commands = np.random.default_rng(1).uniform(-0.5, 0.5, (200, 1))
+
+    def beyond(states):
+        found = tl.check_log(t, states, commands, signals)
+        return found.columns[0].beyond, "envelope" in {remark.code for remark in found.remarks}
+
+    assert beyond(states) == (0.0, False)
+    gone = states.copy()
+    gone[:50, 0] += 1.2  # beyond, on the turn of the log
+    outside = np.abs(gone[:, 0] - 2.0 * np.pi) > 1.0
+    share = outside.mean()
+    assert share > 0.1 and beyond(gone) == (pytest.approx(share), True)
+    gone[outside.argmax(), 0] = np.nan  # neither inside nor outside
+    assert beyond(gone)[0] == pytest.approx((201 * share - 1) / 200)

@@ -45,6 +45,26 @@ def outside(usages: Floats) -> NDArray[np.bool_]:
     return ~np.asarray(usages <= 1.0)
 
 
+def band_outside(state: State, low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """Where a band of predicted values of a state is not wholly inside its envelope.
+
+    Args:
+        state: with an envelope.
+        low: smallest value at each sample (n,), in its unit; of an angle that wraps, on any turn.
+        high: largest value (n,), on the same turn as `low`, or beyond it.
+
+    Returns:
+        A flag each (n,); one that is not finite is outside.
+    """
+    assert state.envelope is not None  # the caller asks about those that have one
+    least, most = state.envelope
+    if state.period is not None:
+        # As a whole: with both ends inside, a band may still lead through what is outside, from turn to turn.
+        turns = np.rint((0.5 * (low + high) - 0.5 * (least + most)) / state.period)
+        low, high = low - turns * state.period, high - turns * state.period
+    return ~((low >= least) & (high <= most))
+
+
 def readings_leave(usages: Floats) -> bool:
     """Whether a flown flight left the envelope, as far as its readings tell.
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinloop._experiment.envelope import band_outside
 from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import controller_to_fly
@@ -29,7 +30,7 @@ def leaving(signals: Signals, predicted: Trajectory | None) -> dict[str, tuple[f
         if state.envelope is None:
             continue
         low, high = predicted.band[:, :, i]
-        beyond = np.flatnonzero(~((low >= state.envelope[0]) & (high <= state.envelope[1])))
+        beyond = np.flatnonzero(band_outside(state, low, high))
         if len(beyond):
             found[state.name] = float(predicted.t[beyond[0]]), float(predicted.t[beyond[-1]])
     return found

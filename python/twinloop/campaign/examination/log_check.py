@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import in_unit, two_digits
@@ -284,8 +285,8 @@ def _states(states: Floats, signals: Signals) -> Iterator[Column]:
         kept, missing = _finite(states[:, i])
         beyond = None
         if state.envelope is not None and len(kept):
-            low, high = state.envelope
-            beyond = float(((kept < low) | (kept > high)).mean())
+            usages = usages_of(signals, states, only=state)
+            beyond = float(outside(usages[np.isfinite(states[:, i])]).mean())
         least, greatest = _ends(kept)
         yield Column(state.name, state.unit, False, least, greatest, missing, moved[i], None, beyond)
 
