@@ -1,11 +1,13 @@
 """The command `twinloop`: one JSON object, the same bits, exit codes 0, 1, 2 and 130."""
 
+import contextlib
 import json
 import os
 import re
 import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -409,7 +411,7 @@ def test_a_result_that_cannot_be_written_is_printed(monkeypatch, tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)])
 def test_ctrl_c_and_sigterm_end_with_130_and_the_best_so_far(tmp_path, sent):
     file = tmp_path / "result.json"
     command = [
@@ -438,6 +440,82 @@ def test_ctrl_c_and_sigterm_end_with_130_and_the_best_so_far(tmp_path, sent):
     assert len(result["experiments"]) == 1
     assert 0 < result["iterations"][-1]["generations"] < 1_000_000
     assert file.read_text(encoding="utf-8") == answer
+
+
+HOT_CAMPAIGN = """
+dt = 0.1
+states.temperature = { unit = "degC", scale = 100.0 }
+commands.heater = { unit = "%", bounds = [0.0, 100.0] }
+task = { initial_state = [20.0], target_state = [60.0], duration = 3.0 }
+system.use = "hot:Hot"
+first = { "temperature.kp" = 1.0, "temperature.ki" = 0.0, "temperature.kd" = 0.0 }
+
+[controller]
+kind = "pid"
+axes = ["temperature"]
+gains = { "temperature.kp" = [0.0, 5.0], "temperature.ki" = 0.0, "temperature.kd" = 0.0 }
+"""
+HOT_RIG = """
+import time
+from pathlib import Path
+
+import twinloop as tl
+
+
+class Hot(tl.System):
+    def __init__(self, signals):
+        self.signals = signals
+
+    def run(self, test):
+        try:
+            Path("heater").write_text("on")
+            time.sleep(30)
+        finally:
+            print("coming to rest", flush=True)
+            time.sleep(0.5)
+            Path("heater").write_text("off")
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no terminals that hang up")
+@pytest.mark.parametrize("ignored", [False, True])
+def test_a_rig_comes_to_rest_where_its_terminal_is_closed_unless_it_is_to_go_on(tmp_path, ignored):
+    fcntl, termios = pytest.importorskip("fcntl"), pytest.importorskip("termios")
+    (tmp_path / "hot.py").write_text(HOT_RIG)
+    (tmp_path / "rig.toml").write_text(HOT_CAMPAIGN)
+
+    def on_its_terminal():
+        hearing_ctrl_c()
+        signal.signal(signal.SIGHUP, signal.SIG_IGN if ignored else signal.SIG_DFL)
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+    ours, its = os.openpty()
+    try:
+        working = subprocess.Popen(
+            [sys.executable, "-m", "twinloop", "run", "rig.toml", "--experiments", "1", "--threads", "1"],
+            stdin=its, stdout=its, stderr=its, cwd=tmp_path, start_new_session=True, preexec_fn=on_its_terminal,
+        )  # fmt: skip
+    finally:
+        os.close(its)
+    try:
+        heater = tmp_path / "heater"
+        until = time.monotonic() + 60.0
+        while not heater.exists() and working.poll() is None and time.monotonic() < until:
+            time.sleep(0.05)
+        assert heater.read_text() == "on"
+        os.close(ours)
+        if ignored:
+            time.sleep(1.0)
+            assert working.poll() is None and heater.read_text() == "on"
+            return
+        time.sleep(0.2)
+        with contextlib.suppress(ProcessLookupError):
+            working.send_signal(signal.SIGHUP)  # the shell sends one of its own
+        assert working.wait(timeout=60) == 130
+        assert heater.read_text() == "off"
+    finally:
+        working.kill()
+        working.wait()
 
 
 @pytest.mark.parametrize("finished", [0, 1])

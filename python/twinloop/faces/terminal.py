@@ -1,4 +1,4 @@
-"""Standard streams that can take every text, closed or not, and SIGTERM as Ctrl-C: what a command needs around it."""
+"""What a command needs around it: standard streams that take every text, closed or not; signals heard as Ctrl-C."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 from twinloop._ground.loading import heard
 from twinloop.errors import RemarkWarning
@@ -23,11 +24,14 @@ A stream in ASCII never comes to it: click writes UTF-8 there.
 NEAREST = "twinloop.nearest"
 """Name of that rule, for `codecs`."""
 
+Handler = Callable[[int, FrameType | None], object]
+
 
 @contextmanager
 def prepared() -> Iterator[None]:
     """A command's surroundings: no text is too much for standard output and error, Ctrl-C is heard, SIGTERM as well.
 
+    So is SIGHUP, of a terminal that is closed or a connection that is lost, unless it was ignored, as under `nohup`.
     Remarks are in the result that is shown, and so are no warnings beside it.
     """
     warnings.simplefilter("ignore", RemarkWarning)
@@ -43,11 +47,40 @@ def prepared() -> Iterator[None]:
         yield
         return
     heard()
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    handlers: dict[int, Handler] = {signal.SIGTERM: signal.default_int_handler}
+    # Windows has none.
+    hang_up = getattr(signal, "SIGHUP", None)
+    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
+        handlers[hang_up] = _hearing_once()
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def _hearing_once() -> Handler:
+    """A handler of SIGHUP: as Ctrl-C, once, with nothing more written to the terminal that is gone.
+
+    The shell and the kernel send one each: the second must not end what a rig does to come to rest after the first. Nor
+    must a line that it prints meanwhile, which would fail.
+    """
+    terminals = [number for number in (1, 2) if os.isatty(number)]
+    heard_it = False
+
+    def hung_up(number: int, frame: FrameType | None) -> None:
+        nonlocal heard_it
+        if heard_it:
+            return
+        heard_it = True
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for terminal in terminals:
+            os.dup2(nowhere, terminal)
+        os.close(nowhere)
+        signal.default_int_handler(number, frame)
+
+    return hung_up
 
 
 def is_closed() -> bool:
