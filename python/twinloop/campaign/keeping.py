@@ -18,7 +18,7 @@ from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record
-from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened
+from twinloop.store import Keeper, Store, Stored, begun, found, listed, only_name, opened
 
 Answer = TypeVar("Answer")
 
@@ -199,6 +199,35 @@ def heading(where: str | Path, name: str | None) -> tuple[str, Record]:
         StoreFailure: the store cannot be read.
     """
     return _of_store(where, name, False, begun)
+
+
+def gone_on_with(where: str | Path, name: str | None) -> str | None:
+    """Name of the campaign of a store that is gone on with; no second one is begun beside it.
+
+    Args:
+        where: a file, or the address of a server.
+        name: of the campaign; None: the only one.
+
+    Returns:
+        The name; None where the store has no campaign yet.
+
+    Raises:
+        InvalidInput: no store, no such campaign in it, or several and no name.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: the store cannot be read.
+    """
+    store = opened(where, create=True)
+    try:
+        names = [str(row["name"]) for row in listed(store)]
+        if not names:
+            return None
+        if name is None:
+            name = only_name(store, names)
+    finally:
+        store.close()
+    if name not in names:
+        raise unknown(f"campaign of the store {store.name}", name, names)
+    return name
 
 
 def _of_store(

@@ -51,49 +51,60 @@ def new(file: Path, as_json: bool) -> None:
 @click.option(
     "--batch", type=int, metavar="N", help="Plan N alternative tests, the best first; fly them in any order."
 )
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
+def ask(
+    store: str,
+    last: bool,
+    again: bool,
+    batch: int | None,
+    name: str | None,
+    threads: int | None,
+    as_json: bool,
+) -> None:
     """Plan the next test: a test sheet, and a file with the excitation and the predicted run.
 
     If STORE.db has no campaign yet, it is begun from STORE.toml beside it. A waiting test is shown again.
     """
     if batch is not None:
-        _ask_batch(store, batch, last or again, threads, as_json)
+        _ask_batch(store, batch, last or again, name, threads, as_json)
         return
-    with closing(opened_by_hand(store, threads)) as campaign:
+    with closing(opened_by_hand(store, name, threads)) as campaign:
         waiting = campaign.waiting
         # Whatever was attached: the first test is the controller that is trusted.
         if all(run.attached for run in campaign.experiments):
             test = next(iter(to_be_flown(campaign)), None) or _first(store, campaign)
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
-        text, described = _shown(store, campaign, test)
+        text, described = _shown(store, name, campaign, test)
         click.echo(to_json(described) if as_json else text, nl=False)
 
 
-def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
+def _ask_batch(
+    store: str, batch: int, other: bool, name: str | None, threads: int | None, as_json: bool
+) -> None:
     """Alternatives: those that wait, and as many more as are missing."""
     if other:
         raise InvalidInput("ask: expected --batch alone, found --last or --again beside it; leave one out.")
-    with closing(opened_by_hand(store, threads)) as campaign:
+    with closing(opened_by_hand(store, name, threads)) as campaign:
         if not campaign.experiments:
             raise InvalidInput(
                 "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
-                f" {to_type('ask', shown_name(store))}."
+                f" {to_type('ask', shown_name(store), *_named(name))}."
             )
-        shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
+        shown = [_shown(store, name, campaign, test) for test in campaign.ask_batch(batch)]
         if as_json:
             click.echo(to_json({"tests": [described for _, described in shown]}), nl=False)
             return
         click.echo(
             f"{len(shown)} alternatives, the best first. Fly them in any order and record each with tell;"
-            f" for a test that you will not fly: {to_type('abandon', shown_name(store), 'TEST')}\n"
+            f" for a test that you will not fly: {to_type('abandon', shown_name(store), 'TEST', *_named(name))}\n"
         )
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
 
-def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
+def _shown(store: str, name: str | None, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     """The sheet of a test, and the same as facts; its file is written."""
     predicted = foreseen(campaign, test)
     beside = file_beside(store)
@@ -103,7 +114,15 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     against_twin = serious_of(latest_lesson(campaign))
     advice = advised_to_stop(campaign)
     text = sheet(
-        shown_name(store), test, predicted, str(file), campaign.setup, against_twin, campaign.waiting, advice
+        shown_name(store),
+        test,
+        predicted,
+        str(file),
+        campaign.setup,
+        against_twin,
+        campaign.waiting,
+        advice,
+        _named(name),
     )
     return text, facts(test, file, bool(campaign.experiments), predicted, against_twin, advice)
 
@@ -117,6 +136,7 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
 )
 @click.option("--aborted", type=Path, metavar="FLIGHT", help="Log of a test that was stopped before its end.")
 @click.option("--reason", metavar="REASON", help="Required with --aborted: why it was stopped.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @json_option
 def tell(
     store: str,
@@ -125,11 +145,12 @@ def tell(
     failed: str | None,
     aborted: Path | None,
     reason: str | None,
+    name: str | None,
     as_json: bool,
 ) -> None:
     """Record the result of a TEST: a FLIGHT as CSV or .npz, complete or aborted, or why there is none."""
-    log = _told(store, test, flight, failed, aborted, reason)
-    with closing(opened_by_hand(store)) as campaign:
+    log = _told(store, name, test, flight, failed, aborted, reason)
+    with closing(opened_by_hand(store, name)) as campaign:
         if failed is not None:
             asked, read = tell_failed(campaign, test, failed, log)
         else:
@@ -139,7 +160,7 @@ def tell(
                 test,
                 log,
                 aborted=reason or "",
-                otherwise=f"record a test that was stopped early: {_aborted(store, test, log, 'why')}",
+                otherwise=f"record a test that was stopped early: {_aborted(store, name, test, log, 'why')}",
             )
         text = (
             f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {counted(campaign)} in"
@@ -157,7 +178,13 @@ def tell(
 
 
 def _told(
-    store: str, test: int, flight: Path | None, failed: str | None, aborted: Path | None, reason: str | None
+    store: str,
+    name: str | None,
+    test: int,
+    flight: Path | None,
+    failed: str | None,
+    aborted: Path | None,
+    reason: str | None,
 ) -> Path | None:
     """The log of a run, once the arguments fit together."""
     if failed is not None and aborted is not None:
@@ -166,7 +193,7 @@ def _told(
         why = str(aborted) if reason is None else reason
         raise InvalidInput(
             f"tell: expected the log of an aborted flight behind --aborted, found {flight} before it; write:"
-            f" {_aborted(store, test, flight, why)}."
+            f" {_aborted(store, name, test, flight, why)}."
         )
     if reason is not None and (aborted is None or not reason.strip()):
         raise InvalidInput(
@@ -176,7 +203,7 @@ def _told(
     if aborted is not None and reason is None:
         raise InvalidInput(
             "tell: expected why the flight was stopped, found no --reason; write:"
-            f" {_aborted(store, test, aborted, 'why')}."
+            f" {_aborted(store, name, test, aborted, 'why')}."
         )
     if failed is not None and not failed.strip():
         raise InvalidInput(
@@ -190,18 +217,19 @@ def _told(
     return flight if aborted is None else aborted
 
 
-def _aborted(store: str, test: int, log: Path, why: str) -> str:
+def _aborted(store: str, name: str | None, test: int, log: Path, why: str) -> str:
     """The command that tells an aborted flight."""
-    return to_type("tell", shown_name(store), test, "--aborted", log, "--reason", why)
+    return to_type("tell", shown_name(store), test, "--aborted", log, "--reason", why, *_named(name))
 
 
 @click.command()
 @click.argument("store")
 @click.argument("flight", type=Path)
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @json_option
-def attach(store: str, flight: Path, as_json: bool) -> None:
+def attach(store: str, flight: Path, name: str | None, as_json: bool) -> None:
     """Add a recorded FLIGHT without a test, as CSV or .npz."""
-    with closing(opened_by_hand(store)) as campaign:
+    with closing(opened_by_hand(store, name)) as campaign:
         read = attach_flight(campaign, flight)
         text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
         remarks = against_it(campaign, campaign.experiments[-1], None, read)
@@ -214,14 +242,20 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
 @click.command()
 @click.argument("store")
 @click.argument("test", type=int)
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @json_option
-def abandon(store: str, test: int, as_json: bool) -> None:
+def abandon(store: str, test: int, name: str | None, as_json: bool) -> None:
     """Mark a TEST as not to be flown."""
-    with closing(opened_by_hand(store)) as campaign:
+    with closing(opened_by_hand(store, name)) as campaign:
         asked = numbered(campaign, test)
         campaign.abandon(asked)
         text = f"Saved: test {test} abandoned in {shown_name(store)}."
         answer(_standing(campaign, asked), text, as_json)
+
+
+def _named(name: str | None) -> list[str]:
+    """Words of the next command that name the campaign, where the last one did."""
+    return [] if name is None else ["--name", name]
 
 
 def _say(remarks: Sequence[str]) -> None:

@@ -10,21 +10,26 @@ from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.agreement import check_agreement
 from twinloop.campaign.campaign_file import read_file
-from twinloop.campaign.keeping import look
+from twinloop.campaign.keeping import gone_on_with, look
 from twinloop.errors import InvalidInput
 from twinloop.faces.from_file import file_beside
 from twinloop.store import shown_name
 
+BEGUN = "campaign"
+"""Name of a campaign that nobody named."""
 
-def opened_by_hand(store: str, threads: int | None = None) -> Campaign:
-    """The campaign of a store, to be written; it is begun from the file beside it where there is none.
+
+def opened_by_hand(store: str, name: str | None = None, threads: int | None = None) -> Campaign:
+    """The campaign of a store, to be written; it is begun from the file beside it where the store has none.
 
     Args:
         store: a file, or the address of a server.
+        name: of the campaign; None: the only one.
         threads: of the engine; None: all.
 
     Raises:
-        InvalidInput: neither a store nor a file, or a file that describes another campaign.
+        InvalidInput: neither a store nor a file, a file that describes another campaign, no such campaign, or several
+            and no name.
         StoreFailure: somebody else writes the campaign.
     """
     file = file_beside(store)
@@ -36,9 +41,10 @@ def opened_by_hand(store: str, threads: int | None = None) -> Campaign:
                 f"Store {store}: expected {begun}, which has the campaign of {file}, found another name; for another"
                 " campaign, copy the file."
             )
-        return read_file(file).campaign(store=store, threads=threads)
+        known = gone_on_with(store, name) if Path(store).exists() else None
+        return read_file(file).campaign(store=store, name=known or name or BEGUN, threads=threads)
     if file is None or Path(store).exists():
-        return Campaign.load(store, threads=threads)
+        return Campaign.load(store, name, threads=threads)
     raise InvalidInput(
         f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
         f" {to_type('new', file)}."

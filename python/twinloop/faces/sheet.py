@@ -260,6 +260,7 @@ def sheet(
     against: Sequence[Remark] = (),
     waiting: Sequence[Test] = (),
     advice: str = "",
+    named: Sequence[str] = (),
 ) -> str:
     """The test sheet, to be printed.
 
@@ -272,6 +273,7 @@ def sheet(
         against: what speaks against the twin.
         waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
         advice: to stop instead; empty where there is none.
+        named: words of the next command that name the campaign; none where it is the only one of its store.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
@@ -309,5 +311,5 @@ def sheet(
     lines += [f"{one}." for one in in_words(signals)]
     read = [signals.state_names[i] for i in signals.measured]
     lines.append(f"Record t, {', '.join((*read, *signals.command_names))}, then:")
-    lines.append(f"  {to_type('tell', store, test.number, 'FLIGHT.csv')}")
+    lines.append(f"  {to_type('tell', store, test.number, 'FLIGHT.csv', *named)}")
     return "\n".join(lines) + "\n"

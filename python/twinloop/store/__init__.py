@@ -3,7 +3,7 @@
 from twinloop.store.address import is_address, shown_name
 from twinloop.store.approvals import approve, approved
 from twinloop.store.database import Store, opened
-from twinloop.store.keeper import Keeper, Stored, begun, found, listed
+from twinloop.store.keeper import Keeper, Stored, begun, found, listed, only_name
 from twinloop.store.watching import Doing, doing, state
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "found",
     "is_address",
     "listed",
+    "only_name",
     "opened",
     "shown_name",
     "state",

@@ -142,11 +142,25 @@ def _only_name(connection: Connection, store: Store) -> str:
     from twinloop.store.schema import campaigns
 
     names = list(connection.execute(select(campaigns.c.name).order_by(campaigns.c.id)).scalars())
+    return only_name(store, [str(name) for name in names])
+
+
+def only_name(store: Store, names: Sequence[str]) -> str:
+    """The name of the only campaign of a store; empty where it has none.
+
+    Args:
+        store: open.
+        names: of its campaigns.
+
+    Raises:
+        InvalidInput: there are several.
+    """
     if len(names) > 1:
         raise InvalidInput(
             f"Store {store.name}: expected the name of one of its campaigns, found none; it holds {', '.join(names)}."
+            " Choose one with --name, in Python with name=."
         )
-    return str(names[0]) if names else ""
+    return names[0] if names else ""
 
 
 def begun(store: Store, name: str | None) -> tuple[str, Record] | None:
