@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import lives
 import twinloop as tl
-from conftest import pendulum_step
+from conftest import TINY, pendulum_step
 from lives import SIGNALS, SMALL
 from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, read_signals, template
@@ -105,6 +105,44 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     # What was asked for is shown again, and not planned anew.
     assert run("ask", "rig.db").stdout == sheet and len(look().tests) == 2
     assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
+
+
+def test_the_last_test_is_shown_again_while_it_waits(folder):
+    run("ask", "rig.db")
+    flown(look().tests[0])
+    run("tell", "rig.db", "0", "flight.csv")
+    explores = run("ask", "rig.db").stdout
+    last = run("ask", "rig.db", "--last").stdout
+    assert "TEST 2 of" in last and "Excitation of the commands: none." in last
+    assert run("ask", "rig.db", "--last").stdout == last and len(look().tests) == 3
+    # Each kind of question has its own answer, and that no one else has given up.
+    assert run("ask", "rig.db").stdout == explores
+    assert look().waiting_last.number == 2
+    assert "TEST 3 of" in run("ask", "rig.db", "--again", "--last").stdout
+    assert run("abandon", "rig.db", "2").exit_code == 0 and look().waiting_last is None
+    again = run("ask", "rig.db", "--last").stdout
+    assert "TEST 4 of" in again and "Excitation of the commands: none." in again
+    flown(look().tests[4])
+    run("tell", "rig.db", "4", "flight.csv")
+    assert look().waiting_last is None and "TEST 5 of" in run("ask", "rig.db", "--last").stdout
+
+
+@pytest.mark.parametrize("how", ['[campaign]\npreset = "paper"\n', "exploit_last = false\n"])
+def test_where_no_test_is_the_last_the_one_that_waits_is_shown_again(folder, how):
+    text = Path("rig.toml").read_text(encoding="utf-8")
+    if "paper" in how:
+        options = "".join(f"{name} = {_toml(value)}\n" for name, value in TINY.items())
+        text = f"{PENDULUM.partition('[campaign]')[0]}{how}[options]\n{options}"
+    else:
+        text += how
+    Path("rig.toml").write_text(text, encoding="utf-8")
+    run("ask", "rig.db")
+    flown(look().tests[0])
+    run("tell", "rig.db", "0", "flight.csv")
+    asked = run("ask", "rig.db")
+    assert asked.exit_code == 0, asked.output
+    assert run("ask", "rig.db", "--last").stdout == asked.stdout
+    assert "TEST 2 of" in run("ask", "rig.db", "--again", "--last").stdout
 
 
 def test_commands_that_are_advised_quote_names_with_blanks(folder):

@@ -636,6 +636,20 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return tuple(self._book.waiting())
 
     @property
+    def waiting_last(self) -> Test | None:
+        """The waiting test that is the last: it flies the best gains of today without excitation. None: there is none.
+
+        All runs are learnt first. Where `ask(last=True)` plans what `ask()` does, it is the first one that waits.
+        """
+        if not self._book.waiting():
+            return None
+        with self._at_work():
+            self._learn()
+            found = self._method.waiting_last(self._book)
+            self._keep()  # who asks later need not tune again
+            return found
+
+    @property
     def trusted(self) -> Test | None:
         """The first test known to fly: all its runs ended inside the envelope, and none has failed. None: no test is.
 

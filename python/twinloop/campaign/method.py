@@ -118,6 +118,14 @@ class Method(Protocol):
         """
         ...
 
+    def waiting_last(self, book: Logbook) -> Test | None:
+        """The waiting test that is what `ask` plans as the last one; None: there is none. All runs are learnt.
+
+        Args:
+            book: with at least one experiment.
+        """
+        ...
+
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The controller to fly; all runs are learnt.
 

@@ -65,18 +65,19 @@ def ask(
 ) -> None:
     """Plan the next test: a test sheet, and a file with the excitation and the predicted run.
 
-    If STORE.db has no campaign yet, it is begun from STORE.toml beside it. A waiting test is shown again.
+    If STORE.db has no campaign yet, it is begun from STORE.toml beside it. A waiting test is shown again, with --last
+    the waiting last one.
     """
     if batch is not None:
         _ask_batch(store, batch, last or again, name, threads, as_json)
         return
     with closing(opened_by_hand(store, name, threads)) as campaign:
-        waiting = campaign.waiting
         # Whatever was attached: the first test is the controller that is trusted.
         if all(run.attached for run in campaign.experiments):
             test = next(iter(to_be_flown(campaign)), None) or _first(store, campaign)
         else:
-            test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
+            known = campaign.waiting_last if last else next(iter(campaign.waiting), None)
+            test = campaign.ask(last=last) if again or known is None else known
         text, described = _shown(store, name, campaign, test)
         click.echo(to_json(described) if as_json else text, nl=False)
 

@@ -133,6 +133,10 @@ class Coevolution:
         self.memory = Memory(self.memory.latest, self.memory.latest)
         return test
 
+    def waiting_last(self, book: Logbook) -> Test | None:
+        """The first one that waits: that an experiment is the last means nothing to the paper."""
+        return next(iter(book.waiting()), None)
+
     def _chosen(self, iteration: int) -> _core.TestSearch:
         """The test loop at its end; one that was under way goes on."""
         total, choosing = self.options.generations_of_tests, self.memory.choosing

@@ -162,7 +162,7 @@ class IdentifyAndPlan:
                 " neither; fly a controller that you trust: campaign.test(gains), then campaign.tell."
             )
         tuned = self._gains(book)
-        waits = _waits(book, tuned)
+        waits = _waiting_last(book, tuned) is not None
         final = last and self.options.exploit_last and not waits
         found = self.planner.propose(
             committee,
@@ -194,6 +194,12 @@ class IdentifyAndPlan:
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
+
+    def waiting_last(self, book: Logbook) -> Test | None:
+        """The test that waits and flies the tuned gains as they are; the first that waits where no test is the last."""
+        if self.options.tests != "ask" or not self.options.exploit_last:
+            return next(iter(book.waiting()), None)
+        return _waiting_last(book, self._gains(book))
 
     def _held_back(self, book: Logbook, found: Proposal) -> HoldBack | None:
         """What holds back the excitation of a test of a committee that cannot say where it leads."""
@@ -408,9 +414,10 @@ class IdentifyAndPlan:
         )
 
 
-def _waits(book: Logbook, tuned: Floats) -> bool:
-    """Whether a test that is waiting flies the tuned gains as they are: then that one is the last."""
-    return any(test.genes.tobytes() == tuned.tobytes() and test.excitation is None for test in book.waiting())
+def _waiting_last(book: Logbook, tuned: Floats) -> Test | None:
+    """The test that is waiting and flies the tuned gains as they are, if there is one: then that one is the last."""
+    as_they_are = (test for test in book.waiting() if test.excitation is None)
+    return next((test for test in as_they_are if test.genes.tobytes() == tuned.tobytes()), None)
 
 
 def _planned(test: Test, found: Proposal) -> Planned:
