@@ -1,12 +1,14 @@
 """What a campaign has cost: every kind of run is counted once, seconds and qualities add up."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from lives import OTHER_GAINS, PLANT, begun, by_hand, cut, made
+from lives import OTHER_GAINS, PLANT, SIGNALS, begun, by_hand, cut, made
 from twinloop.faces.report.cost import cost_table
+from twinloop.faces.report.tables.flights import data
 from twinloop.faces.result import summary
 
 
@@ -50,3 +52,20 @@ def test_the_report_says_it_with_units():
     assert said["cumulative regret"].startswith("0 rad s over a best of ")
     assert said["elapsed time to the last recorded flight"] == "1 min 15 s"
     assert math.isfinite(float(said["largest use of the envelope"].split()[0]))
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_nothing_is_used_of_an_envelope_that_is_not_declared(declared):
+    states = [dataclasses.replace(s, envelope=s.envelope if declared else None) for s in SIGNALS.states]
+    campaign = begun(signals=dataclasses.replace(SIGNALS, states=states))
+    (row,) = data(campaign.examine()).rows
+    said = {row[0]: row[1] for row in cost_table(summary(campaign, {}, {}), None).rows}
+    used = 100.0 * campaign.cost.usage
+    if declared:
+        assert used > 0.0 and float(row[6]) == pytest.approx(used, rel=1e-3)
+        assert said["largest use of the envelope"] == f"{used:.3g} %"
+        assert said["runs that left the envelope"] == "0"
+    else:
+        assert row[6] == "–"
+        assert said["largest use of the envelope"] == "none declared"
+        assert said["runs that left the envelope"] == "–"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.trajectory import continued
@@ -28,7 +29,7 @@ class DataQuality:
         least: name of that state.
         saturated: share of the periods in which a command was at a bound, the most of all commands.
         large: share of innovations beyond three standard deviations; None without innovations. 0.3 % are expected.
-        usage: largest usage of the envelope by its readings; 0 without an envelope.
+        usage: largest usage of the envelope by its readings; None without an envelope.
         fingerprint: the first 16 hexadecimal digits of the SHA-256 of times, states and commands, as little-endian
             doubles in this order.
     """
@@ -40,7 +41,7 @@ class DataQuality:
     least: str
     saturated: float
     large: float | None
-    usage: float
+    usage: float | None
     fingerprint: str
 
 
@@ -71,7 +72,7 @@ def data_quality(
         least,
         saturated,
         large,
-        run.usage,
+        run.usage if is_bounded(signals) else None,
         fingerprint(run),
     )
 

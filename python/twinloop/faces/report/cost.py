@@ -8,6 +8,7 @@ from typing import Any
 from twinloop._ground.texts import in_unit
 from twinloop.campaign.remaining import duration
 from twinloop.faces.report.tables.table import Table, shown_value
+from twinloop.faces.text.words import is_bounded
 
 
 def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
@@ -17,15 +18,15 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
         result: of the campaign.
         elapsed: seconds until the last `tell`; None if unknown.
     """
-    cost, unit = result["cost"], result["quality"]["unit"]
+    cost, unit, bounded = result["cost"], result["quality"]["unit"], is_bounded(result)
     rows = [
         ["runs on the system", str(cost["runs"])],
         ["of these cut, failed", f"{cost['cut']}, {cost['failed']}"],
         ["recorded flight time", f"{cost['seconds']:.4g} s"],
-        ["runs that left the envelope", str(cost["left"])],
+        ["runs that left the envelope", str(cost["left"]) if bounded else "–"],
         [
             "largest use of the envelope",
-            f"{100.0 * cost['usage']:.3g} %" if cost["usage"] else "none declared",
+            f"{100.0 * cost['usage']:.3g} %" if bounded else "none declared",
         ],
     ]
     if cost["attached"]:

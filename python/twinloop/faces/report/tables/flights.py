@@ -39,7 +39,8 @@ def data(found: Examination) -> Table:
     rows = [
         [name, each.seconds, each.ended,
          None if each.moved is None else f"{each.moved:.3g} ({words(each.least)})", 100.0 * each.saturated,
-         None if each.large is None else 100.0 * each.large, 100.0 * each.usage, each.fingerprint]
+         None if each.large is None else 100.0 * each.large, None if each.usage is None else 100.0 * each.usage,
+         each.fingerprint]
         for name, each in zip(found.names, found.data, strict=True)
     ]  # fmt: skip
     head = [
