@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from itertools import chain, combinations, product
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.righted import (
+    LITTLE,
+    Change,
+    crossed,
+    exchanged_states,
+    nearest,
+    other_signs,
+    other_units,
+)
 from twinloop.campaign.data.rows import late_commands
 from twinloop.campaign.excited import (
     NEARER,
@@ -28,8 +37,6 @@ from twinloop.unmeasured import completed_readings
 
 OTHER = 0.5
 """Share of what a command does, or all do on average, that may differ from what their controller gives, squared."""
-LITTLE = 0.02
-"""Share of their bounds by which commands may differ whatever they do."""
 LEVELS = 5
 """Values that commands have at most that are sent in pulses."""
 EXCHANGED = 20.0
@@ -74,15 +81,38 @@ def exchanged_with_state(run: Experiment) -> tuple[str, str] | None:
     return None if run.test is None else _exchanged_with_state(run.test, run.trajectory)
 
 
-def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) -> Iterator[Remark]:
+def change_that_rights(run: Experiment) -> str:
+    """What of a log's columns has to be changed so that its commands are those of the test's controller.
+
+    Of exchanged columns, signs and units that explain the commands it is the one that does so best.
+
+    Args:
+        run: of a test.
+
+    Returns:
+        Such as "temp and level exchanged"; empty where no such change explains them.
+    """
+    if run.test is None:
+        return ""
+    test, flight = run.test, run.trajectory
+    kinds = (crossed, exchanged_states, other_signs, other_units)
+    words = nearest(test, flight, chain.from_iterable(kind(test, flight) for kind in kinds))
+    if words:
+        return words
+    # Where something else is wrong, too, two commands may still be nearer to their own.
+    pair = exchanged(run)
+    return "" if pair is None else f"{' and '.join(test.signals.command_names[i] for i in pair)} exchanged"
+
+
+def from_other_controllers(tests: Sequence[int], change: str = "") -> Iterator[Remark]:
     """Tests whose recorded commands are none that their controllers give.
 
     Args:
         tests: their numbers.
-        exchanged: names of two columns with which they would be, once exchanged; empty: there are none.
+        change: of a log's columns with which they would be, in words; empty: none is known.
     """
     if tests:
-        hint = f" They would be with {' and '.join(exchanged)} exchanged." if exchanged else ""
+        hint = f" They would be with {change}." if change else ""
         yield serious(
             "other-commands",
             f"The commands recorded of test{'s' if len(tests) > 1 else ''} {', '.join(map(str, tests))} are"
@@ -169,9 +199,16 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
         elif (
             _exchanged(sent, asked, run.test) is not None
             or _exchanged_with_state(run.test, run.trajectory) is not None
+            or nearest(run.test, run.trajectory, _of_states(run.test, run.trajectory))
         ):
             found[run.test.number] = False
     return found
+
+
+def _of_states(test: Test, run: Trajectory) -> Iterator[Change]:
+    """Changes that may leave commands near to their controller's, and the twin of another system."""
+    yield from exchanged_states(test, run)
+    yield from other_signs(test, run)
 
 
 def sent_and_asked(test: Test, run: Trajectory) -> tuple[Floats, Floats]:

@@ -18,8 +18,7 @@ from twinloop.campaign.data.lateness import late
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.rows import from_late_commands, in_other_rows
 from twinloop.campaign.data.sent import (
-    exchanged,
-    exchanged_with_state,
+    change_that_rights,
     from_another_excitation,
     from_other_controllers,
     other_commands,
@@ -181,7 +180,7 @@ def against(
     run = flight.trajectory
     found = _checked(run.t, run.states, run.commands, signals, lines, compared=False).remarks
     others = other_commands([flight])
-    names = _exchanged(flight, signals) if others else ()
+    change = change_that_rights(flight) if others else ""
     late = in_other_rows([flight])
     if isinstance(flight.replayed, FlownOtherwise):
         asked = flight.replayed.flown
@@ -190,21 +189,13 @@ def against(
     return [
         *(each for each in found if each.serious),
         *from_late_commands(late),
-        *from_other_controllers(others, names),
+        *from_other_controllers(others, change),
         *from_other_gains([flight]),
         *from_other_starts([flight], serious),
         *from_first_readings(flight),
         *ended_early(flight),
         *excitations,
     ]
-
-
-def _exchanged(flight: Experiment, signals: Signals) -> Sequence[str]:
-    """Two columns that are exchanged, by the recorded commands; empty where none are."""
-    pair = exchanged(flight)
-    if pair is not None:
-        return [signals.command_names[i] for i in pair]
-    return exchanged_with_state(flight) or ()
 
 
 def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) -> Iterator[Remark]:
