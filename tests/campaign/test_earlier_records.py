@@ -13,6 +13,7 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS
 from sameness import through_json
+from twinloop.campaign.history import Planned
 from twinloop.campaign.setup import Setup
 from twinloop.identification.search.structure import Sum
 
@@ -75,6 +76,15 @@ def test_an_unknown_key_of_an_earlier_version_is_refused_by_its_name(written):
     written["memory"]["latest"]["luck"] = 1.0
     with pytest.raises(tl.InvalidInput, match="luck"):
         tl.Campaign.from_record(written)
+
+
+def test_of_a_test_without_a_committee_nothing_was_estimated():
+    now = Planned(1, (2.0,), None, None, None, None, None, None, "Chosen without a committee.")
+    zeros = {"predicted": "nan", "spread": 0.0, "risk": 0.0, "safe": True, "bits": 0.0, "gain": 0.0}
+    assert Planned.from_record({**now.to_record(), **zeros, "version": 1}) == now
+    assert Planned.from_record(through_json(now.to_record())) == now
+    judged = Planned(1, (2.0,), 1.5, 0.1, 0.05, True, 3.0, 0.2, "It tells most.")
+    assert Planned.from_record({**judged.to_record(), "version": 1}) == judged
 
 
 @pytest.mark.parametrize("contacts", [True, False])

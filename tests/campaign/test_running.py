@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from conftest import PENDULUM_GAINS
+from conftest import PENDULUM_GAINS, TINY
 from lives import CONTROLLER, SMALL
 from twinloop.campaign.rescue import rescued
 from twinloop.logs.files import read_log
@@ -82,6 +82,33 @@ def test_what_is_riskier_than_allowed_waits_and_is_not_flown(pendulum):
     assert "still waits" not in str(refusal.value)  # nothing holds it after the process
     assert [test.number for test in campaign.waiting] == [1] and len(campaign.experiments) == 1
     assert len(campaign.run(pendulum, 2, max_risk=0.9).experiments) == 2
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"preset": "paper", "options": TINY}, {"preset": "default", "options": {**SMALL, "tests": "random"}}],
+    ids=["paper", "random"],
+)
+def test_a_test_whose_risk_nobody_has_estimated_may_have_any(pendulum, changes):
+    campaign = tl.Campaign(
+        pendulum.signals, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0,
+        threads=1, **changes,
+    )  # fmt: skip
+    with pytest.raises(
+        tl.TooRisky, match="that no committee has estimated for test 1; the test was not flown"
+    ):
+        campaign.run(pendulum, 3, max_risk=0.99)
+    assert [test.number for test in campaign.waiting] == [1] and len(campaign.experiments) == 1
+    campaign.abandon(campaign.waiting[0])
+    own = campaign.test(PENDULUM_GAINS)
+    campaign.tell(own, pendulum.run(own))
+    assert len(campaign.run(pendulum, 3).experiments) == 3
+
+
+def test_a_test_of_somebodys_own_is_flown_whatever_risk_is_allowed(pendulum, new_campaign):
+    campaign = new_campaign()
+    campaign.test(PENDULUM_GAINS)
+    assert len(campaign.run(pendulum, 1, max_risk=0.0).experiments) == 1
 
 
 def test_a_rig_of_which_no_reading_moves_is_not_flown_on_before_somebody_has_looked(pendulum):

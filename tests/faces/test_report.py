@@ -202,6 +202,10 @@ def test_the_spread_of_a_test_that_waits_is_no_power_of_ten(good, monkeypatch):
     monkeypatch.setattr(tl.Campaign, "waiting", property(lambda campaign: (test,)))
     text = "".join(Elements(report_page(good, "pendulum", {"name": "a pendulum"}, {})).text)
     assert "Test 4 waits to be flown: quality 212.6 ± 100 predicted, risk " in text
+    assert "risk not estimated" not in text
+    test.risk = None
+    text = "".join(Elements(report_page(good, "pendulum", {"name": "a pendulum"}, {})).text)
+    assert "predicted, risk not estimated. Because." in text
 
 
 def test_strange_names_and_reasons_are_shown_and_never_run(good):

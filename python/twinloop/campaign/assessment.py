@@ -61,7 +61,12 @@ def advice(twin: Twin, setup: Setup, lessons: Sequence[Lesson], best: Test | Non
         lessons: of its identifications, with what was planned after each.
         best: the controller to fly, if there is any.
     """
-    judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
+    judged = [
+        (plan, lesson)
+        for lesson in lessons
+        for plan in lesson.asked
+        if plan.predicted is not None and math.isfinite(plan.predicted)
+    ]
     gain = judged[-1][0].gain if judged else None
     # A model that does not follow its own runs, then or now, that is not to be believed, or in which all gains are as
     # good, can advise nobody.

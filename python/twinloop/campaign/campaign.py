@@ -352,7 +352,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
                 runs do not.
             timeout: seconds that the system may take for a test; None: no limit.
             max_risk: largest accepted risk, the probability by the committee that a test leaves the envelope; None:
-                no limit. Tests of your own have no predicted risk, and are flown.
+                no limit. A test that is asked for without a committee, as by the preset "paper", may have any risk.
+                Tests of your own have no predicted risk, and are flown.
 
         Returns:
             The campaign.

@@ -85,7 +85,8 @@ def fly(
         check_signals(test, system.signals)
         if not waited:
             _refuse_silence(campaign, test)
-        if test.risk is not None and test.risk > allowed:
+        if _risk(campaign, test) > allowed:
+            found = "one that no committee has estimated" if test.risk is None else f"{test.risk:.3g}"
             # Without a store it waits as long as this process lasts, and a command ends with this sentence.
             kept = (
                 " and still waits: fly it by hand, abandon it, or raise max_risk."
@@ -94,7 +95,7 @@ def fly(
             )
             raise TooRisky(
                 f"Campaign.run: expected a test that leaves the envelope with a probability of at most"
-                f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; the test was not flown{kept}"
+                f" {allowed:.3g}, found {found} for test {test.number}; the test was not flown{kept}"
             )
         announce()
         before = len(campaign.experiments)
@@ -104,6 +105,16 @@ def fly(
             # A test that failed has left no flight; one that landed at Ctrl-C has.
             if campaign.landed is not None and len(campaign.experiments) > before:
                 campaign.landed(test, campaign.experiments[-1])
+
+
+def _risk(campaign: Campaign, test: Test) -> float:
+    """The highest risk that a test may have: any where it was asked for and nobody has estimated one.
+
+    A test of somebody's own is flown at their own risk.
+    """
+    if test.risk is not None:
+        return test.risk
+    return 1.0 if any(test.number == asked.number for asked in campaign.waiting) else 0.0
 
 
 def _refuse_silence(campaign: Campaign, test: Test) -> None:

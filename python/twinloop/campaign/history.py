@@ -202,31 +202,41 @@ class TestLoop(Recorded, kind="test_loop"):
 
 @dataclass(frozen=True)
 class Planned(Recorded, kind="planned"):
-    """A test that the preset `default` has proposed.
+    """A test that the preset `default` has proposed; what no committee has estimated of it is None.
 
     Args:
         test: number of the test.
         genes: gains of the test, in their units.
-        predicted: quality on the committee, mean; infinite if a member diverges.
-        spread: expected standard deviation of the measured quality.
-        risk: probability that the flight leaves the envelope, by the committee.
-        safe: whether every member keeps the margin.
-        bits: expected information of the flight.
-        gain: improvement of the quality if the right member were known.
+        predicted: quality on the committee, mean; infinite if a member diverges; None without a committee.
+        spread: expected standard deviation of the measured quality; None without a committee.
+        risk: probability that the flight leaves the envelope, by the committee; None without one.
+        safe: whether every member keeps the margin; None without a committee.
+        bits: expected information of the flight; None without a committee.
+        gain: improvement of the quality if the right member were known; None without a committee.
         reason: why this one.
         flown: quality on the system, mean over complete runs; None if there was none.
     """
 
     test: int
     genes: tuple[float, ...]
-    predicted: float
-    spread: float
-    risk: float
-    safe: bool
-    bits: float
-    gain: float
+    predicted: float | None
+    spread: float | None
+    risk: float | None
+    safe: bool | None
+    bits: float | None
+    gain: float | None
     reason: str
     flown: float | None = None
+
+    VERSION = 2
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version: a test without a committee had no prediction, and zeros beside it."""
+        found = super().renewed(record)
+        if found.get("predicted") == "nan":
+            found |= dict.fromkeys(("predicted", "spread", "risk", "safe", "bits", "gain"))
+        return found
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ def ranked(tests: Iterable[Test], plans: Mapping[int, Planned], goal: str) -> tu
 
     Args:
         tests: that wait to be flown.
-        plans: what was expected of each, by its number; tests without one come last, in their order.
+        plans: what was expected of each, by its number; tests of which nothing was come last, in their order.
         goal: "control": the best predicted quality first; else the most bits that a flight tells first.
 
     Returns:
@@ -22,7 +22,7 @@ def ranked(tests: Iterable[Test], plans: Mapping[int, Planned], goal: str) -> tu
 
     def worth(test: Test) -> tuple[bool, bool, float, int]:
         plan = plans.get(test.number)
-        if plan is None:
+        if plan is None or plan.predicted is None or plan.bits is None:
             return True, True, 0.0, test.number
         return False, not plan.safe, plan.predicted if goal == "control" else -plan.bits, test.number
 

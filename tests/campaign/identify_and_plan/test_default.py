@@ -355,6 +355,7 @@ def test_tests_that_no_committee_chose_are_flown(begin, pendulum, tests):
     campaign = begin(options={"tests": tests}).run(pendulum, 2)
     plan = campaign.history[0].asked[0]
     assert "without a committee" in plan.reason and plan.flown == campaign.experiments[1].quality
+    assert {plan.predicted, plan.spread, plan.risk, plan.safe, plan.bits, plan.gain} == {None}
     assert np.abs(campaign.experiments[1].test.excitation).max() > 0.0
 
 

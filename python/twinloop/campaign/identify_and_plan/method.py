@@ -220,8 +220,9 @@ class IdentifyAndPlan:
         genes, excitation = self.planner.baseline(len(book.tests), first_genes(self.setup, book))
         test = book.new_test(genes, excitation=excitation, reason="Chosen without a committee.")
         plan = Planned(
-            test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
-        )
+            test.number, tuple(genes.tolist()), predicted=None, spread=None, risk=None, safe=None, bits=None,
+            gain=None, reason=test.reason,
+        )  # fmt: skip
         book.asked.append((self.iteration, plan))
         self.memory = replace(self.memory, asked=self._latest(), under_way=None)
         return test

@@ -65,7 +65,7 @@
     one(".reason").textContent = test.reason || "";
     const rows = Object.entries(test.gains);
     if (test.predicted !== null) rows.push(["quality predicted", (test.predicted + (test.spread === null ? "" : " ± " + test.spread) + " " + test.unit).trim()]);
-    if (test.risk !== null) rows.push(["risk of " + test.risk_of, test.risk]);
+    rows.push(["risk of " + test.risk_of, test.risk === null ? "not estimated" : test.risk]);
     for (const [name, value] of rows) {
       line(one(".set tbody"), [name, value], 1);
     }
