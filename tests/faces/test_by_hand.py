@@ -145,6 +145,27 @@ def test_where_no_test_is_the_last_the_one_that_waits_is_shown_again(folder, how
     assert "TEST 2 of" in run("ask", "rig.db", "--again", "--last").stdout
 
 
+@pytest.mark.parametrize(
+    ("preset", "options"),
+    [("paper", TINY), ("default", {**SMALL, "tests": "random"})],
+    ids=["paper", "random"],
+)
+def test_gains_that_no_committee_judged_are_not_called_those_of_a_trusted_controller(folder, preset, options):
+    campaign = lives.stored("arm.db", preset, options=options)
+    lives.flown(campaign, lives.PLANT)
+    campaign.ask()
+    own = campaign.test(lives.OTHER_GAINS)
+    campaign.close()
+    text, said = run("ask", "arm.db").stdout, json.loads(run("ask", "arm.db", "--json").stdout)
+    assert said["test"] == 1 and said["risk"] is None
+    assert f"Risk of leaving the envelope: {said['risk_unknown']}\n" in text
+    assert "no committee has judged this test" in said["risk_unknown"]
+    assert said["why"] in text and ("not vouched" in said["why"] or "without a committee" in said["why"])
+    assert "first flight" not in text and "already trust" not in text
+    assert "already trust" in sheet("arm.db", own, None, "rig-test-2.csv", campaign.setup)
+    assert [test.number for test in tl.Campaign.load("arm.db", read_only=True).asked] == [1]
+
+
 def test_commands_that_are_advised_quote_names_with_blanks(folder):
     begun = run("new", "my rig.toml")
     assert "twinloop ask 'my rig.db'" in begun.stdout

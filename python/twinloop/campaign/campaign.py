@@ -632,6 +632,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return tuple(self._book.tests)
 
     @property
+    def asked(self) -> tuple[Test, ...]:
+        """Tests from `ask`, flown or not, in order; all others are somebody's own."""
+        return tuple(self._book.tests[entry.test] for _, entry in self._book.asked)
+
+    @property
     def waiting(self) -> tuple[Test, ...]:
         """Tests from `ask` that wait for their run: neither told nor abandoned, in order."""
         return tuple(self._book.waiting())

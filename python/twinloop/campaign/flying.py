@@ -114,7 +114,7 @@ def _risk(campaign: Campaign, test: Test) -> float:
     """
     if test.risk is not None:
         return test.risk
-    return 1.0 if any(test.number == asked.number for asked in campaign.waiting) else 0.0
+    return 1.0 if any(test.number == asked.number for asked in campaign.asked) else 0.0
 
 
 def _refuse_silence(campaign: Campaign, test: Test) -> None:

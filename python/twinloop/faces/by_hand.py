@@ -21,7 +21,15 @@ from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import opened_by_hand
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
-from twinloop.faces.telling import against_it, counted, numbered, said_against, tell_failed, to_be_flown
+from twinloop.faces.telling import (
+    against_it,
+    counted,
+    is_chosen,
+    numbered,
+    said_against,
+    tell_failed,
+    to_be_flown,
+)
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
@@ -113,7 +121,7 @@ def _shown(store: str, name: str | None, campaign: Campaign, test: Test) -> tupl
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
-    advice = advised_to_stop(campaign)
+    advice, chosen = advised_to_stop(campaign), is_chosen(campaign, test)
     text = sheet(
         shown_name(store),
         test,
@@ -124,8 +132,9 @@ def _shown(store: str, name: str | None, campaign: Campaign, test: Test) -> tupl
         campaign.waiting,
         advice,
         _named(name),
+        chosen,
     )
-    return text, facts(test, file, bool(campaign.experiments), predicted, against_twin, advice)
+    return text, facts(test, file, bool(campaign.experiments), predicted, against_twin, advice, chosen)
 
 
 @click.command()

@@ -68,15 +68,18 @@ def _expected(test: Test, predicted: Trajectory | None) -> str:
     return table(heads, rows)
 
 
-def reason(test: Test, flown: bool) -> str:
+def reason(test: Test, flown: bool, chosen: bool = False) -> str:
     """Why this test; of one with gains of a person's own what it is for.
 
     Args:
         test: to be flown.
         flown: whether there is any run yet.
+        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     if test.reason:
         return test.reason
+    if chosen:
+        return "Chosen by the campaign, which tells its models apart with it: you have not vouched for these gains."
     excited = "" if test.excitation is None else ", with an excitation that shows what the commands do"
     known = (
         "nothing is known of the system before it."
@@ -97,21 +100,23 @@ def foretold(test: Test) -> str:
     return f"{test.predicted:.4g}" + ("" if test.spread is None else f" ± {test.spread:.3g}")
 
 
-def unknown_risk(test: Test) -> str:
+def unknown_risk(test: Test, chosen: bool = False) -> str:
     """What can be said of the risk of a test that no committee has judged: what is added to its controller's commands.
 
     Args:
         test: to be flown.
+        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
+    unknown = (
+        "not estimated: no committee has judged this test. Look at its gains before you fly it."
+        if chosen
+        else "not estimated before the first flight."
+    )
     if test.excitation is None:
-        return (
-            "not estimated before the first flight. Nothing is added to the commands, so the risk is that of the"
-            " controller."
-        )
+        return f"{unknown} Nothing is added to the commands, so the risk is that of the controller."
     signals = test.family.signals
     text = (
-        "not estimated before the first flight. It is the risk of the controller with an excitation of"
-        f" {_at_most(test, test.excitation)}"
+        f"{unknown} It is the risk of the controller with an excitation of {_at_most(test, test.excitation)}"
     )
     ranges = {} if test.hold_back is None else test.hold_back.ranges(signals)
     if ranges:
@@ -183,6 +188,7 @@ def facts(
     predicted: Trajectory | None,
     against: Sequence[Remark],
     advice: str = "",
+    chosen: bool = False,
 ) -> dict[str, object]:
     """The sheet as values.
 
@@ -193,6 +199,7 @@ def facts(
         predicted: its run on the twin; None where nothing is known yet.
         against: what speaks against the twin.
         advice: to stop instead; empty where there is none.
+        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     signals = test.family.signals
     return {
@@ -207,11 +214,11 @@ def facts(
         "predicted": test.predicted,
         "spread": test.spread,
         "risk": test.risk,
-        "risk_unknown": unknown_risk(test) if test.risk is None else None,
+        "risk_unknown": unknown_risk(test, chosen) if test.risk is None else None,
         "band_leaves": {name: list(times) for name, times in leaving(signals, predicted).items()},
         "serious": list(dict.fromkeys(remark.code for remark in against)),
         "advice": advice or None,
-        "why": reason(test, flown),
+        "why": reason(test, flown, chosen),
         "file": str(file),
     }
 
@@ -261,6 +268,7 @@ def sheet(
     waiting: Sequence[Test] = (),
     advice: str = "",
     named: Sequence[str] = (),
+    chosen: bool = False,
 ) -> str:
     """The test sheet, to be printed.
 
@@ -274,6 +282,7 @@ def sheet(
         waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
         advice: to stop instead; empty where there is none.
         named: words of the next command that name the campaign; none where it is the only one of its store.
+        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
@@ -300,14 +309,14 @@ def sheet(
         lines += ["", _expected(test, predicted), ""]
     bounded = is_bounded(signals)
     risk = (
-        unknown_risk(test)
+        unknown_risk(test, chosen)
         if test.risk is None
         else f"{risk_words(test.risk, setup.predicted_flights, bounded)}."
     )
     lines.append(f"Risk of {risk_of_what(bounded)}: {risk}")
     lines += band_leaves(signals, predicted)
     lines += not_reliable(store, against)
-    lines += [reason(test, predicted is not None), *_alike(test, waiting)]
+    lines += [reason(test, predicted is not None, chosen), *_alike(test, waiting)]
     lines += [f"{one}." for one in in_words(signals)]
     read = [signals.state_names[i] for i in signals.measured]
     lines.append(f"Record t, {', '.join((*read, *signals.command_names))}, then:")

@@ -174,6 +174,16 @@ def to_be_flown(campaign: Campaign) -> list[Test]:
     return [test for test in campaign.tests if campaign.status(test) == "asked"]
 
 
+def is_chosen(campaign: Campaign, test: Test) -> bool:
+    """Whether the campaign chose a test, by `ask`; otherwise it is a person's own.
+
+    Args:
+        campaign: of it.
+        test: of the campaign.
+    """
+    return any(test.number == asked.number for asked in campaign.asked)
+
+
 def against_it(campaign: Campaign, flight: Experiment, test: Test | None, read: Log | None) -> list[str]:
     """What speaks against a flight that was told or attached: said at once, while somebody can still look at the rig.
 

@@ -36,7 +36,7 @@ from twinloop.faces.sheet import (
     sheet,
     unknown_risk,
 )
-from twinloop.faces.telling import numbered, to_be_flown
+from twinloop.faces.telling import is_chosen, numbered, to_be_flown
 from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
 from twinloop.planning.leaving import risk_of_what, risk_words
@@ -232,7 +232,9 @@ class Pages:
                     if test.risk is None
                     else risk_words(test.risk, campaign.setup.predicted_flights, bounded),
                     "risk_of": risk_of_what(bounded),
-                    "risk_unknown": unknown_risk(test) if test.risk is None else None,
+                    "risk_unknown": unknown_risk(test, is_chosen(campaign, test))
+                    if test.risk is None
+                    else None,
                     "advice": advice,
                     "reason": reason(test, flown=bool(campaign.history)),
                     "ends": _ends(test),
@@ -266,8 +268,10 @@ class Pages:
         predicted = foreseen(campaign, test) if campaign.history else None
         against = serious_of(latest_lesson(campaign))
         waiting, file = to_be_flown(campaign), f"test-{number}.csv"
-        advice = advised_to_stop(campaign)
-        return sheet(self.desk.title, test, predicted, file, campaign.setup, against, waiting, advice)
+        advice, chosen = advised_to_stop(campaign), is_chosen(campaign, test)
+        return sheet(
+            self.desk.title, test, predicted, file, campaign.setup, against, waiting, advice, chosen=chosen
+        )
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.agreeing(name)
