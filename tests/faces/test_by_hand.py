@@ -166,6 +166,25 @@ def test_gains_that_no_committee_judged_are_not_called_those_of_a_trusted_contro
     assert [test.number for test in tl.Campaign.load("arm.db", read_only=True).asked] == [1]
 
 
+def test_a_target_that_varies_with_time_has_its_ends_on_the_sheet_and_its_rows_in_the_file(folder):
+    campaign = lives.stored("arm.db", "default", target_state=lambda t: [0.5 + 0.5 * t, 0.0])
+    lives.flown(campaign, lives.PLANT)
+    campaign.close()
+    asked = run("ask", "arm.db")
+    assert asked.exit_code == 0, asked.output
+    words = [line.split() for line in asked.stdout.splitlines()]
+    assert ["angle", "0", "0.5", "1", "rad"] in words and ["rate", "0", "0", "0", "rad/s"] in words
+    assert "arm-test-1.csv has a row of it a period (target_angle)" in asked.stdout
+    test = tl.Campaign.load("arm.db", read_only=True).tests[1]
+    with open("arm-test-1.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    expected = [0.5 + 0.5 * SIGNALS.dt * k for k in range(test.steps + 1)]
+    assert [float(row["target_angle"]) for row in rows] == pytest.approx(expected, abs=1e-12)
+    assert "target_rate" not in rows[0]
+    said = json.loads(run("ask", "arm.db", "--json").stdout)["target_state"]
+    assert said["angle"] == pytest.approx(expected) and said["rate"] == 0.0
+
+
 def test_commands_that_are_advised_quote_names_with_blanks(folder):
     begun = run("new", "my rig.toml")
     assert "twinloop ask 'my rig.db'" in begun.stdout

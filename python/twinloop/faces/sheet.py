@@ -27,7 +27,7 @@ ROWS = 10
 
 
 def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
-    """What is added to each command, and the predicted run with its band, by name.
+    """What is added to each command, targets that vary, and the predicted run with its band, by name.
 
     Args:
         test: to be flown.
@@ -37,12 +37,35 @@ def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
     columns = {TIME: signals.dt * np.arange(test.steps + 1)}
     if test.excitation is not None:
         columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
+    columns |= {f"target_{name}": rows for name, rows in _varying(test).items()}
     if predicted is not None:
         for i, name in enumerate(signals.state_names):
             columns[f"predicted_{name}"] = predicted.states[:, i]
             if predicted.band is not None:
                 columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
     return columns
+
+
+def _varying(test: Test) -> dict[str, Floats]:
+    """The target of each state whose target varies with time, by name (n + 1,)."""
+    names, target = test.family.signals.state_names, np.atleast_2d(test.target_state)
+    return {name: target[:, i] for i, name in enumerate(names) if (target[:, i] != target[0, i]).any()}
+
+
+def _ends(test: Test, file: str) -> list[str]:
+    """Where each state starts and leads; of a target that varies the first and the last row, for the file has all."""
+    signals, target, varying = test.family.signals, np.atleast_2d(test.target_state), _varying(test)
+    leads = ["first target", "last target"] if varying else ["target"]
+    ends = [target[0].tolist(), target[-1].tolist()][: len(leads)]
+    rows = [
+        [state.name, *numbers, state.unit]
+        for state, *numbers in zip(signals.states, test.initial_state.tolist(), *ends, strict=True)
+    ]
+    lines = [table(["state", "start", *leads, "unit"], rows)]
+    if varying:
+        named = ", ".join(f"target_{name}" for name in varying)
+        lines += ["", f"The target varies with time: {file} has a row of it a period ({named})."]
+    return lines
 
 
 def _expected(test: Test, predicted: Trajectory | None) -> str:
@@ -206,7 +229,10 @@ def facts(
         "test": test.number,
         "gains": test.parameters,
         "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
-        "target_state": dict(zip(signals.state_names, test.target_state.tolist(), strict=True)),
+        "target_state": {
+            **dict(zip(signals.state_names, np.atleast_2d(test.target_state)[-1].tolist(), strict=True)),
+            **{name: rows.tolist() for name, rows in _varying(test).items()},
+        },
         "steps": test.steps,
         "dt": signals.dt,
         "excited": test.excitation is not None,
@@ -286,15 +312,13 @@ def sheet(
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
-    ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
-    states = [[state.name, start, target, state.unit] for state, start, target in ends]
     lines = [
         f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
         *([advice] if advice else []),
         "",
         table(["set this gain", "to", "unit"], gains),
         "",
-        table(["state", "start", "target", "unit"], states),
+        *_ends(test, file),
         "",
         excitation_words(test, file),
         *_held_back(test, file),

@@ -236,7 +236,7 @@ class Pages:
                     if test.risk is None
                     else None,
                     "advice": advice,
-                    "reason": reason(test, flown=bool(campaign.history)),
+                    "reason": reason(test, flown=bool(campaign.history), chosen=is_chosen(campaign, test)),
                     "ends": _ends(test),
                     "excitation": excitation_words(test, f"test-{test.number}.csv"),
                     "hold_back": hold_back_words(test),
