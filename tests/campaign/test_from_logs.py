@@ -109,6 +109,17 @@ def test_a_run_that_is_learnt_is_not_held_out():
         learnt_from_logs([run], SIGNALS, [by_hand(40)])
 
 
+def test_a_copy_of_a_run_that_is_learnt_is_not_held_out_either():
+    run = by_hand(40)
+    noise = 1e-3 * np.random.default_rng(0).normal(size=run.states.shape)
+    noisy = dataclasses.replace(run, states=run.states + noise)
+    copy = dataclasses.replace(run, states=np.round(noisy.states, 4), commands=np.round(run.commands, 4))
+    with pytest.raises(
+        tl.InvalidInput, match="found a copy of one that is: their readings differ by far less"
+    ):
+        learnt_from_logs([noisy], SIGNALS, [copy])
+
+
 @pytest.mark.parametrize(
     ("runs", "found"),
     [

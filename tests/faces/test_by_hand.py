@@ -335,6 +335,49 @@ def test_after_old_logs_the_first_test_is_still_the_controller_that_is_trusted(f
     assert "angle, rad" in run("ask", "rig.db").stdout
 
 
+def flown_in_noise(test, file, seed, digits=None, steps=None):
+    """The log of a test with noisy sensors, saved with some digits, and cut after some steps."""
+    run = tl.systems.Simulated(SIGNALS, pendulum_step, noise=[2e-3, 1e-2], seed=seed).run(test)
+    columns = {"t": run.t, "torque": run.commands[:, 0], "rate": run.states[:, 1], "angle": run.states[:, 0]}
+    if digits is not None:
+        columns = {name: np.round(values, digits) for name, values in columns.items()}
+    if steps is not None:
+        rows = {name: steps + (name != "torque") for name in columns}
+        columns = {name: values[: rows[name]] for name, values in columns.items()}
+    write_columns(Path(file), columns)
+
+
+def test_a_copy_with_fewer_digits_is_no_flight_that_the_twin_has_not_seen(folder):
+    longer = (folder / "rig.toml").read_text().replace("duration = 1.0", "duration = 2.0")
+    (folder / "rig.toml").write_text(longer)
+    run("ask", "rig.db")
+    test = look().tests[0]
+    flown_in_noise(test, "flight.csv", 0)
+    flown_in_noise(test, "copy.csv", 0, digits=4)
+    flown_in_noise(test, "other.csv", 1, digits=4)
+    flown_in_noise(test, "part.csv", 0, digits=4, steps=35)
+    assert run("tell", "rig.db", "0", "flight.csv").exit_code == 0
+    for again in (run("attach", "rig.db", "copy.csv"), run("tell", "rig.db", "0", "copy.csv")):
+        assert again.exit_code == 2 and len(look().experiments) == 1
+        assert "copy.csv: expected a new flight, found a copy of one that is recorded already" in again.stderr
+    # The same controller from the same start, but another flight.
+    other = run("attach", "rig.db", "other.csv")
+    assert other.exit_code == 0 and "count twice" not in other.output
+    part = run("attach", "rig.db", "part.csv")
+    assert part.exit_code == 0, part.output
+    assert "the same first 35 steps but for digits far below the noise" in " ".join(part.output.split())
+
+
+def test_a_copy_that_is_told_as_another_test_is_said_at_once(folder):
+    run("ask", "rig.db")
+    flown_in_noise(look().tests[0], "flight.csv", 0)
+    flown_in_noise(look().tests[0], "copy.csv", 0, digits=4)
+    run("tell", "rig.db", "0", "flight.csv")
+    run("ask", "rig.db")
+    told = " ".join(run("tell", "rig.db", "1", "copy.csv").output.split())
+    assert "but for digits far below the noise, which no two flights share, so that they count twice" in told
+
+
 def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_beside_what_was_flown(folder):
     for number in range(2):
         sheet = run("ask", "rig.db").stdout

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from twinloop.campaign.campaign import Campaign
+from twinloop.campaign.data.copies import copied
 from twinloop.campaign.history import Progress
 from twinloop.controllers import StateFeedback
 from twinloop.errors import InvalidInput
@@ -76,6 +77,11 @@ def learnt_from_logs(
         raise InvalidInput(
             "identify: expected runs to hold out that are not learnt, found one that is, equal to the last digit; leave"
             " it out of one of the two."
+        )
+    if any(copied(run, other, signals) for run in apart for other in found):
+        raise InvalidInput(
+            "identify: expected runs to hold out that are not learnt, found a copy of one that is: their readings"
+            " differ by far less than their noise, which no two flights share; leave it out of one of the two."
         )
     names = list(logs) or [""] * (len(found) + len(apart))
     if len(names) != len(found) + len(apart):

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop._ground.texts import to_type, whole_characters
 from twinloop.campaign import Campaign
+from twinloop.campaign.data.copies import copied
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput
@@ -215,27 +216,49 @@ def _told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> li
         if other is flight or (test is not None and _again(other.test, test)):
             continue
         short, long = sorted((run, other.trajectory), key=lambda each: each.steps)
-        if begins_as(short, long):
+        exact = begins_as(short, long)
+        if exact or copied(run, other.trajectory, campaign.signals):
             of = "an attached flight" if other.number is None else f"a flight of test {other.number}"
             withdraw = to_type("withdraw", shown_name(campaign.store or "STORE"), "LOG", "--reason", "WHY")
+            how = (
+                "to the last digit"
+                if exact
+                else "but for digits far below the noise, which no two flights share"
+            )
             said.append(
-                f"{of.capitalize()} of {other.trajectory.steps} steps has the same first {short.steps} steps to the"
-                " last digit, so that they count twice: withdraw the shorter record by its log:"
-                f" {withdraw}"
+                f"{of.capitalize()} of {other.trajectory.steps} steps has the same first {short.steps} steps {how},"
+                " so that they count twice: withdraw the"
+                f" {'shorter record' if short.steps < long.steps else 'one that is the copy'} by its log: {withdraw}"
             )
     return said
 
 
 def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | None) -> None:
-    """Refuses a log that is there already; a system without noise repeats itself where a test is flown again."""
+    """Refuses a log that is there already; a system without noise repeats itself where a test is flown again.
+
+    A copy with other digits is refused where it would pass for a flight that was not learnt, or for a second one of a
+    test. Of other tests it is only said: with nearly the same gains a simulator whose noise begins again flies nearly
+    the same.
+    """
     for told in campaign.experiments:
-        if recorded_as(run, told.trajectory, campaign.signals) and not (
-            test is not None and _again(told.test, test)
+        if recorded_as(run, told.trajectory, campaign.signals):
+            if test is not None and _again(told.test, test):
+                continue
+            how = "one that is recorded already, equal to the last digit"
+        elif (
+            run.steps == told.trajectory.steps
+            and (test is None or (told.test is not None and told.test.number == test.number))
+            and copied(run, told.trajectory, campaign.signals)
         ):
-            raise InvalidInput(
-                f"Log {called}: expected a new flight, found one that is recorded already, equal to the last"
-                " digit; nothing was changed. Name the log of this flight."
+            how = (
+                "a copy of one that is recorded already: their readings differ by far less than their noise, which no"
+                " two flights share"
             )
+        else:
+            continue
+        raise InvalidInput(
+            f"Log {called}: expected a new flight, found {how}; nothing was changed. Name the log of this flight."
+        )
 
 
 def _again(earlier: Test | None, test: Test) -> bool:

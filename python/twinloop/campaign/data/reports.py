@@ -153,11 +153,12 @@ def derived(records: Sequence[Floats]) -> Iterator[Derived]:
                 yield found
 
 
-def scatters(records: Sequence[Floats]) -> bool:
+def scatters(records: Sequence[Floats], as_large: float = AS_LARGE) -> bool:
     """Whether what no polynomial follows is noise: it is as large in differences of any order, which motion is not.
 
     Args:
         records: of one state, a run each (n + 1,).
+        as_large: how many times larger it may be in one order than in the next, by chance.
     """
     found = []
     for order in (5, 6):
@@ -166,4 +167,4 @@ def scatters(records: Sequence[Floats]) -> bool:
             return False
         squares = np.square(np.concatenate(differences))
         found.append(float(np.median(squares)) / math.comb(2 * order, order))
-    return 0.0 < found[0] < AS_LARGE * found[1] and found[1] < AS_LARGE * found[0]
+    return 0.0 < found[0] < as_large * found[1] and found[1] < as_large * found[0]
