@@ -1,5 +1,6 @@
 """Laws and controllers around a point: beside differences of what the twin predicts, SciPy and python-control."""
 
+import dataclasses
 import math
 
 import control
@@ -20,7 +21,7 @@ from twinloop.law.forms import DERIVATIVES, FORMS
 from twinloop.law.law import Law
 from twinloop.law.linear.controller import linear_controller
 from twinloop.law.linear.jacobian import jacobian
-from twinloop.law.linear.margins import Loops
+from twinloop.law.linear.margins import LoopMargins, Loops, worst
 from twinloop.law.linear.plant import linearised, trimmed
 
 
@@ -292,9 +293,9 @@ def test_the_margins_of_a_campaign_are_those_of_its_twin_and_the_worst_of_its_co
     found = campaign.margins(system.default_gains)
     assert [row.loop for row in found.nominal] == ["roll", "pitch", "yaw"] and found.broken_at == "axes"
     assert found.members == len(campaign.twin.members)
-    for nominal, worst in zip(found.nominal, found.worst, strict=True):
-        assert nominal.stable and 1.0 < worst.gain <= nominal.gain and 0.0 < worst.phase <= nominal.phase
-        assert worst.sensitivity >= nominal.sensitivity > 1.0
+    for nominal, least in zip(found.nominal, found.worst, strict=True):
+        assert nominal.stable and 1.0 < least.gain <= nominal.gain and 0.0 < least.phase <= nominal.phase
+        assert least.sensitivity >= nominal.sensitivity > 1.0
     # Axes of a vehicle at its target hardly touch each other: each loop alone has the margins of all closed.
     text = str(found)
     assert "roll" in text and "worst" in text
@@ -327,3 +328,15 @@ def test_a_heater_that_rests_on_its_bound_has_the_margins_of_where_it_holds_its_
 def test_a_heater_that_is_too_weak_for_its_target_has_no_margins_there():
     with pytest.raises(NotAvailable, match="heater at a bound"):
         heated(0.3)
+
+
+def test_the_worst_of_each_margin_is_the_one_nearest_to_the_edge():
+    """Gains may rise up to `gain` and fall to `gain_down`, both nearest to 1 at worst."""
+    calm = LoopMargins("roll", True, 4.0, 0.2, 1.0, 0.3, 5.0, 1.3, 1.1, friction="sliding")
+    edgy = LoopMargins("roll", True, 1.5, 0.7, 0.4, 0.1, 9.0, 3.0, 2.5, friction="sticking")
+    assert worst([calm, edgy]) == worst([edgy, calm]) == edgy
+    mixed = dataclasses.replace(calm, gain_down=0.9, complementary=3.5)
+    both = dataclasses.replace(edgy, gain_down=0.9, complementary=3.5)
+    assert worst([edgy, mixed]) == worst([mixed, edgy]) == both
+    lost = dataclasses.replace(calm, stable=False)
+    assert not worst([calm, lost]).stable and worst([edgy, lost]).friction == "sliding"
