@@ -64,7 +64,8 @@ def test_each_chain_moves_as_its_highest_derivative_says_in_whatever_order_it_wa
 def test_a_rigid_body_turns_the_angles_that_were_named_wherever_they_stand():
     names = ["q", "yaw", "height", "roll", "r", "pitch", "p"]
     body = tl.RigidBody(angles=("roll", "pitch", "yaw"), rates=("p", "q", "r"))
-    known = tl.Signals([tl.State(name, "rad", 10.0) for name in names], [COMMAND], 0.1, kinematics=body)
+    units = {**dict.fromkeys(body.angles, "rad"), **dict.fromkeys(body.rates, "rad/s"), "height": "m"}
+    known = tl.Signals([tl.State(name, units[name], 10.0) for name in names], [COMMAND], 0.1, kinematics=body)
     assert [names[i] for i in known.driven] == ["q", "height", "r", "p"]
     still = constant(known, 0.0, 0.0, 0.0, 0.0)
     for rate, angle in (("p", "roll"), ("q", "pitch"), ("r", "yaw")):
@@ -173,6 +174,33 @@ def test_a_rate_is_not_declared_in_another_unit_than_its_angle(angle, rate):
     ):
         tl.Signals(states, [command], 0.01)
     tl.Signals([states[0], tl.State("turn", f"{angle}/s", 1.0, derivative_of="tilt")], [command], 0.01)
+
+
+@pytest.mark.parametrize(
+    ("angle", "rate", "found"),
+    [
+        (
+            "deg",
+            "deg/s",
+            "found roll in deg, pitch in deg, yaw in deg, p in deg/s, q in deg/s, r in deg/s; declare",
+        ),
+        ("rad", "deg/s", "found p in deg/s, q in deg/s, r in deg/s; declare"),
+        ("rad", "rpm", "found p in rpm, q in rpm, r in rpm; declare"),
+    ],
+)
+def test_a_rigid_body_is_declared_in_radians_as_its_kinematics_are_known_in_no_other_unit(angle, rate, found):
+    names = ("roll", "pitch", "yaw", "p", "q", "r")
+
+    def declared(angle, rate):
+        units = (angle, angle, angle, rate, rate, rate)
+        states = [tl.State(name, unit, 90.0) for name, unit in zip(names, units, strict=True)]
+        return tl.Signals(states, [COMMAND], 0.01, kinematics=tl.RigidBody(names[:3], names[3:]))
+
+    with pytest.raises(tl.InvalidInput, match=found):
+        declared(angle, rate)
+    with pytest.raises(tl.InvalidInput, match="expected roll, pitch, yaw in rad and p, q, r in rad/s"):
+        declared(angle, rate)
+    assert declared("rad", "rad/s").driven == (3, 4, 5)
 
 
 def test_an_angle_that_a_body_turns_has_no_derivative_besides_and_it_is_said_where_to_remove_it():

@@ -64,7 +64,13 @@ def test_states_that_have_a_derivative_or_are_one_get_no_rate():
     names = ("roll", "pitch", "yaw", "p", "q", "r")
     body = tl.RigidBody(names[:3], names[3:])
     with pytest.raises(tl.InvalidInput, match="found none"):
-        tl.Signals([tl.State(n, "rad", 1.0) for n in names], [COMMAND], 0.1, kinematics=body, lags=1)
+        tl.Signals(
+            [tl.State(n, "rad/s" if n in body.rates else "rad", 1.0) for n in names],
+            [COMMAND],
+            0.1,
+            kinematics=body,
+            lags=1,
+        )
 
 
 def test_what_is_made_of_the_past_is_declared_from_then_on():

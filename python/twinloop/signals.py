@@ -182,7 +182,8 @@ class Signals(Value, Recorded, kind="signals"):
 
     Raises:
         InvalidInput: no states or no commands, a name used twice, a `derivative_of` or `kinematics` that do not fit,
-            lags that are no whole number, or no state whose rate they could give.
+            a rigid body in other units than rad and rad/s, lags that are no whole number, or no state whose rate they
+            could give.
     """
 
     states: Sequence[State]
@@ -206,6 +207,7 @@ class Signals(Value, Recorded, kind="signals"):
                 if name not in self.state_names:
                     raise unknown("state in the kinematics", name, self.state_names)
             self._check_turned(self.kinematics)
+            self._check_radians(self.kinematics)
         if whole("Signals, lags", lags):
             self._append_rates()
             self._check_names()
@@ -246,6 +248,18 @@ class Signals(Value, Recorded, kind="signals"):
                 f"Signals: expected angles that the kinematics alone turn, found derivatives too: {found}; remove"
                 f" `derivative_of` from {', '.join(repr(state.name) for state in declared)}, because body rates are not"
                 " the derivatives of the angles."
+            )
+
+    def _check_radians(self, body: RigidBody) -> None:
+        """Refuses a body in other units: how rates turn angles is known in radians alone, by their sines."""
+        units = {state.name: state.unit for state in self.states}
+        wanted = {**dict.fromkeys(body.angles, "rad"), **dict.fromkeys(body.rates, "rad/s")}
+        found = ", ".join(f"{name} in {units[name]}" for name in wanted if units[name] != wanted[name])
+        if found:
+            raise InvalidInput(
+                f"Signals, kinematics: expected {', '.join(body.angles)} in rad and {', '.join(body.rates)} in rad/s,"
+                f" found {found}; declare them so, with scales, envelopes and noise in these units, and convert the"
+                " columns of the log."
             )
 
     def _check_derivatives(self) -> None:

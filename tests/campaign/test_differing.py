@@ -8,7 +8,10 @@ BODY = tl.RigidBody(NAMES[:3], NAMES[3:])
 
 
 def record(order=NAMES, of=None, body=None):
-    states = [tl.State(name, "1", 1.0, derivative_of=(of or {}).get(name)) for name in order]
+    states = [
+        tl.State(name, "rad/s" if name in BODY.rates else "rad", 1.0, derivative_of=(of or {}).get(name))
+        for name in order
+    ]
     return {
         "signals": tl.Signals(states, [tl.Command("u", "1", (-1.0, 1.0))], 0.1, kinematics=body).to_record()
     }

@@ -285,7 +285,9 @@ def test_the_law_of_a_magnet_is_found():
 
 def test_driven_states_are_those_that_no_other_gives():
     names = ("roll", "pitch", "yaw", "p", "q", "r")
-    states = [tl.State(name, "rad", 1.0) for name in names]
+    states = [
+        tl.State(name, unit, 1.0) for name, unit in zip(names, ["rad"] * 3 + ["rad/s"] * 3, strict=True)
+    ]
     command = [tl.Command("u", "V", (0.0, 1.0))]
     body = tl.RigidBody(names[:3], names[3:])
     assert tl.Signals(states, command, 0.1).driven == (0, 1, 2, 3, 4, 5)
