@@ -1,5 +1,7 @@
 """What holds an excitation back: beside a loop that is written out, wherever the engine flies a test."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -174,6 +176,22 @@ def test_a_rate_has_no_more_room_than_what_it_is_the_rate_of_in_the_time_of_a_sw
     assert np.isinf(held.none[2:]).all()
     # A shorter swing: its own envelope has the say.
     assert HoldBack.between(signals, np.zeros(4), np.zeros(4), 0.1).none[1][1] == 7.0 * ENDS
+
+
+@pytest.mark.parametrize("order", list(permutations(("place", "speed", "acceleration", "jerk"))))
+def test_a_rate_has_the_room_of_its_integral_in_whatever_order_they_are_declared(order):
+    known = {
+        "place": tl.State("place", "m", 1.0, envelope=(-1.0, 1.0)),
+        "speed": tl.State("speed", "m/s", 1.0, derivative_of="place", envelope=(-10.0, 10.0)),
+        "acceleration": tl.State("acceleration", "m/s²", 1.0, derivative_of="speed", envelope=(-3.0, 100.0)),
+        "jerk": tl.State("jerk", "m/s³", 1.0, derivative_of="acceleration", envelope=(-1e3, 1e3)),
+    }
+    signals = tl.Signals([known[name] for name in order], [tl.Command("u", "N", (-1.0, 1.0))], 0.05)
+    ranges = HoldBack.between(signals, np.zeros(4), np.zeros(4), 0.5).ranges(signals)
+    # Divided by half a second from state to state, but no more than the envelope leaves.
+    rooms = {"place": (-1.0, 1.0), "speed": (-2.0, 2.0), "acceleration": (-3.0, 4.0), "jerk": (-6.0, 8.0)}
+    for name, room in rooms.items():
+        assert ranges[name]["none"] == pytest.approx([ENDS * end for end in room])
 
 
 def test_an_excitation_may_lead_as_far_as_the_controller_by_itself_as_long_as_a_fifth_of_the_room_is_left():

@@ -139,12 +139,22 @@ class HoldBack(Value, Recorded, kind="hold_back"):
 
 
 def _rates(signals: Signals) -> dict[str, str]:
-    """Of what each state is the rate, by name: its declared derivative, or a body rate about the angle's axis."""
+    """Of what each state is the rate, by name: its declared derivative, or a body rate about the angle's axis.
+
+    From integrals to derivatives, in whatever order the states are declared: the room of a rate depends on the room
+    that is left to what it is the rate of.
+    """
     declared = {
         state.name: state.derivative_of for state in signals.states if state.derivative_of is not None
     }
     body = signals.kinematics
-    return declared if body is None else {**dict(zip(body.rates, body.angles, strict=True)), **declared}
+    left = declared if body is None else {**dict(zip(body.rates, body.angles, strict=True)), **declared}
+    ordered: dict[str, str] = {}
+    while left:
+        # Rates of what is no rate itself, or is in order already; all, should an angle derive from its own body rate.
+        ordered |= {rate: of for rate, of in left.items() if of not in left} or left
+        left = {rate: of for rate, of in left.items() if rate not in ordered}
+    return ordered
 
 
 def _rooms(state: State, farthest: Floats) -> Floats:
