@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -739,6 +740,45 @@ def test_a_store_of_a_newer_version_is_refused(path, pendulum):
     for call in (stored, tl.Campaign.load, lambda where: tl.Campaign.load(where, read_only=True)):
         with pytest.raises(tl.InvalidInput, match="newer Twinloop"):
             call(path)
+
+
+COLUMNS = {
+    "campaigns.system": ("[1]", "a dict as JSON", "list"),
+    "campaigns.setup": ("7", "a dict as JSON", "7"),
+    "campaigns.created": ("yesterday", "a date and time with its zone", "'yesterday'"),
+    "campaigns.experiments": ("many", "a whole number", "'many'"),
+    "sessions.provenance": ("[]", "a dict as JSON", "list"),
+    "sessions.provenance, command": ('{"command": 5}', "a list", "5"),
+    "sessions.provenance, versions": ('{"versions": [1]}', "a dict", "list"),
+    "experiments.told": ("2026-11-28T10:00:00", "a date and time with its zone", "'2026-11-28T10:00:00'"),
+    "experiments.runs": ("a", "a whole number", "'a'"),
+    "checkpoints.record": ("[]", "a dict as JSON", "list"),
+}
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_column_that_somebody_has_changed_is_refused_by_its_name(path, pendulum, column):
+    campaign = flown(stored(path, name="hover"), pendulum)
+    campaign.ask()  # is learnt and kept
+    campaign.close()
+    value, expected, seen = COLUMNS[column]
+    table, name = column.split(",")[0].split(".")
+    with sqlite3.connect(path) as connection:
+        connection.execute(f"update {table} set {name} = ?", (value,))
+    with closing(opened(str(path), read_only=True)) as store, pytest.raises(tl.InvalidInput) as refused:
+        found(store, "hover")
+    said = re.escape(f"expected {expected} in {column}, found {seen}; it was changed: use an earlier copy.")
+    assert re.fullmatch(rf"Store \S*hover\.db, campaign hover: {said}", str(refused.value))
+
+
+@pytest.mark.parametrize(("said", "record"), [("x", "{}"), ("2026-11-28T10:00:00+00:00", "[]")])
+def test_a_progress_that_somebody_has_changed_is_refused(path, pendulum, said, record):
+    flown(stored(path, name="hover"), pendulum).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("insert or replace into progress values (1, ?, ?)", (said, record))
+    words = r"in progress\.(said|record), found"
+    with closing(opened(str(path), read_only=True)) as store, pytest.raises(tl.InvalidInput, match=words):
+        doing(store, "hover")
 
 
 def test_an_experiment_that_somebody_has_changed_is_refused(path, pendulum):

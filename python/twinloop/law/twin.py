@@ -33,6 +33,7 @@ from twinloop.law.noise import Noise
 from twinloop.law.pieces import in_pieces, judged_length
 from twinloop.law.uncertainty import DRAWS, NINE_OF_TEN, committee_runs, spread_of
 from twinloop.records import Record, Recorded, checked_record, from_text, read
+from twinloop.records.reading import text_of
 from twinloop.remarks import Remark, warn
 from twinloop.signals import Signals
 from twinloop.test import Test, check_signals
@@ -527,12 +528,7 @@ def load_twin(path: str | Path) -> Twin:
         The twin, with the same numbers to the bit.
 
     Raises:
-        InvalidInput: no such file, or a file without a twin.
+        InvalidInput: no such file, a file that is too large, or one without a twin.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as reason:
-        raise InvalidInput(
-            f"Twin: expected a file that can be read, found {str(path)!r}: {reason}."
-        ) from reason
-    return Twin.from_record(from_text(text, f"Twin {str(path)!r}"))
+    what = f"Twin {str(path)!r}"
+    return Twin.from_record(from_text(text_of(Path(path), what), what))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from twinloop.errors import InvalidInput, unknown
 
 MOST_ITEMS = 10_000_000
 """Items of a list, characters of a text: more are refused."""
+LARGEST = 1 << 30
+"""Bytes of a file that is read."""
 NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 """Numbers that JSON has no way to write, by the text that stands for them."""
 
@@ -41,6 +44,27 @@ def from_text(text: str, what: str) -> Any:
 
 def _refused(constant: str) -> float:
     raise ValueError(f"{constant}, which JSON does not have")
+
+
+def text_of(path: Path, what: str) -> str:
+    """The text of a file that need not be trusted.
+
+    Args:
+        path: of the file.
+        what: how to call it in an error.
+
+    Raises:
+        InvalidInput: no such file, one that is too large, or one that is no text.
+    """
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise InvalidInput(
+                f"{what}: expected at most {LARGEST} bytes, found {size}; it is none of Twinloop's."
+            )
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise InvalidInput(f"{what}: expected a file that can be read, found: {reason}.") from reason
 
 
 def read_array(value: object, where: str) -> Floats:

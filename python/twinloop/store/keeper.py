@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from twinloop.errors import InvalidInput, StoreFailure
 from twinloop.records import Record, from_text, to_text
+from twinloop.store.columns import count_in, moment_in, provenance_in, record_in
 from twinloop.store.database import Store
 from twinloop.store.lock import AdvisoryLock, FileLock, Lock, taken
 from twinloop.store.uninterrupted import uninterrupted
@@ -123,16 +124,21 @@ def found(store: Store, name: str | None) -> Stored | None:
     logbook = {name: [from_text(entry.record, what) for entry in found] for name, found in entries.items()}
     return Stored(
         name=row.name,
-        setup=from_text(row.setup, what),
+        setup=record_in("campaigns.setup", row.setup, what),
         logbook={"kind": "logbook", "version": 2, "identity": row.identity, **logbook},
-        memory=None if memory is None else from_text(memory, what),
-        system=None if row.system is None else from_text(row.system, what),
-        runs=tuple(run.runs for run in runs),
-        experiments=row.experiments,
-        created=row.created,
-        sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
-        told_at=tuple(run.told for run in runs),
-        withdrawn_at=tuple(each.withdrawn for each in entries["withdrawals"]),
+        memory=None if memory is None else record_in("checkpoints.record", memory, what),
+        system=None if row.system is None else record_in("campaigns.system", row.system, what),
+        runs=tuple(count_in("experiments.runs", run.runs, what) for run in runs),
+        experiments=count_in("campaigns.experiments", row.experiments, what),
+        created=moment_in("campaigns.created", row.created, what),
+        sessions=tuple(
+            {"started": each.started, **provenance_in("sessions.provenance", each.provenance, what)}
+            for each in opened
+        ),
+        told_at=tuple(moment_in("experiments.told", run.told, what) for run in runs),
+        withdrawn_at=tuple(
+            moment_in("withdrawals.withdrawn", each.withdrawn, what) for each in entries["withdrawals"]
+        ),
     )
 
 
@@ -184,7 +190,8 @@ def begun(store: Store, name: str | None) -> tuple[str, Record] | None:
         name = _only_name(connection, store) if name is None else name
         of_this = campaigns.c.name == name
         setup = connection.execute(select(campaigns.c.setup).where(of_this)).scalar()
-    return None if setup is None else (name, from_text(setup, f"Store {store.name}, campaign {name}"))
+    what = f"Store {store.name}, campaign {name}"
+    return None if setup is None else (name, record_in("campaigns.setup", setup, what))
 
 
 class Keeper:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
-from twinloop.records import Record, from_text
+from twinloop.records import Record
+from twinloop.store.columns import moment_in, record_in
 from twinloop.store.database import Store
 
 
@@ -55,6 +56,9 @@ def doing(store: Store, name: str) -> Doing | None:
 
     Returns:
         None where nobody works on it.
+
+    Raises:
+        InvalidInput: a row that is not what was written.
     """
     from sqlalchemy import select
 
@@ -65,5 +69,7 @@ def doing(store: Store, name: str) -> Doing | None:
         row = connection.execute(wanted).one_or_none()
     if row is None:
         return None
-    silent = (datetime.now(timezone.utc) - datetime.fromisoformat(row.said)).total_seconds()
-    return Doing(from_text(row.record, f"Store {store.name}, progress of {name}"), max(0.0, silent))
+    what = f"Store {store.name}, campaign {name}"
+    said = datetime.fromisoformat(moment_in("progress.said", row.said, what))
+    silent = (datetime.now(timezone.utc) - said).total_seconds()
+    return Doing(record_in("progress.record", row.record, what), max(0.0, silent))

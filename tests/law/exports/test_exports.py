@@ -33,6 +33,7 @@ from twinloop.law.exports.simulations import (
 from twinloop.law.exports.taking import compared
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.records.reading import LARGEST
 from twinloop.remarks import Remark
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
@@ -336,6 +337,11 @@ def test_a_file_that_holds_no_twin_is_refused(tmp_path):
     path.write_text("{}")
     with pytest.raises(tl.InvalidInput, match="kind 'twin'"):
         tl.load_twin(path)
+    with path.open("r+b") as file:
+        file.truncate(LARGEST + 1)  # takes no room on a disk: it is not read
+    with pytest.raises(tl.InvalidInput, match=f"expected at most {LARGEST} bytes, found {LARGEST + 1}"):
+        tl.load_twin(path)
+    path.write_text("{}")
     record = twin_of(PENDULUM).to_record()
     # What the first version wrote.
     earlier = {key: value for key, value in record.items() if key != "follows"}

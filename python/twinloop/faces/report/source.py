@@ -14,11 +14,9 @@ from twinloop.campaign.keeping import look
 from twinloop.campaign.provenance import as_typed, without_tokens
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
-from twinloop.records.reading import from_text
+from twinloop.records.reading import from_text, text_of
 from twinloop.store import Stored, is_address, shown_name
 
-LARGEST = 1 << 30
-"""Bytes of a record that is read."""
 OWN = "a system of your own"
 """A system that has no name."""
 
@@ -74,16 +72,8 @@ def _is_json(where: str) -> bool:
 
 
 def _of_record(path: Path, name: str | None, threads: int | None) -> Source:
-    if path.stat().st_size > LARGEST:
-        raise InvalidInput(
-            f"File {str(path)!r}: expected at most 1 GiB of JSON, found {path.stat().st_size} bytes."
-        )
     what = f"File {str(path)!r}"
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as reason:
-        raise InvalidInput(f"{what}: expected a text that can be read, found: {reason}.") from reason
-    record = from_text(text, what)
+    record = from_text(text_of(path, what), what)
     if not isinstance(record, dict) or record.get("kind") != "campaign":
         raise InvalidInput(
             f"{what}: expected the record of a campaign, as campaign.to_record() gives, found another JSON; a result"
