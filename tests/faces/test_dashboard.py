@@ -18,7 +18,7 @@ import twinloop as tl
 from command import hearing_ctrl_c, invoke
 from conftest import PENDULUM_GAINS
 from dashboards import begun, call, flight, look, served
-from lives import PLANT, stored
+from lives import OTHER_GAINS, PLANT, stored
 
 pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
 pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
@@ -78,6 +78,20 @@ def test_a_card_and_its_sheet_say_that_the_advice_is_to_stop(store, monkeypatch)
     monkeypatch.setattr(tl.Campaign, "best_test", best)
     card, sheet = shown()
     assert card.startswith("The advice is to stop: ") and f"\n{card}\n" in sheet
+
+
+def test_a_card_has_the_ends_of_a_target_that_varies_with_time(tmp_path):
+    path = tmp_path / "arm.db"
+    campaign = stored(path, "default", target_state=lambda t: [0.5 + 0.5 * t, 0.0])
+    campaign.test(OTHER_GAINS)
+    campaign.close()
+    with served(path) as address:
+        (card,) = json.loads(call(address, "GET", "/c/1/tests")[2])["tests"]
+    assert [row[:3] for row in card["ends"]] == [
+        ["state", "start", "target"],
+        ["angle (rad)", "0", "0.5 to 1"],
+        ["rate (rad/s)", "0", "0"],
+    ]
 
 
 def test_what_went_wrong_is_told(store, tmp_path):

@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect, Request
@@ -287,13 +288,17 @@ def _ends(test: Test) -> list[list[str]]:
     """Where a test starts and should end, and the ranges by which its excitation is held back, as a table."""
     ranges = hold_back_ranges(test)
     head = ["state", "start", "target", *(("inner range", "outer range") if ranges else ())]
-    ends = zip(
-        test.family.signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True
-    )
+    # Of a target that varies with time its first and its last row.
+    targets = np.atleast_2d(test.target_state)
+    wanted = [
+        " to ".join(dict.fromkeys(f"{value:.4g}" for value in each)) for each in targets[[0, -1]].T.tolist()
+    ]
+    ends = zip(test.family.signals.states, test.initial_state.tolist(), wanted, strict=True)
     rows = [
         [
             f"{state.name} ({state.unit})" if state.unit not in ("", "1") else state.name,
-            *(f"{value:.4g}" for value in (start, target)),
+            f"{start:.4g}",
+            target,
             *(ranges.get(state.name, ("any", "any")) if ranges else ()),
         ]
         for state, start, target in ends
