@@ -177,7 +177,7 @@ def test_a_flight_that_would_leave_is_ended_before_it_does_and_the_fallback_keep
     states, commands = fly(guard, test)
     assert guard.tripped and guard.tripped_at < leaving and "angle would leave its envelope" in guard.reason
     assert np.abs(states[:, 0]).max() <= 1.3
-    # From there on it is the first controller, from rest.
+    # From there on it is the first controller, from rest: what the integral has had for so short a time is no load.
     fallback = campaign.family.controller(campaign.tests[0].genes)
     at = guard.tripped_at
     expected = [fallback.command(x, test.target(0)) for x in states[at:-1]]

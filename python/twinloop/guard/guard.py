@@ -20,6 +20,7 @@ from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard.band import BandWatch
 from twinloop.guard.rounded import RoundedWatch
 from twinloop.guard.sensors import SensorWatch
+from twinloop.guard.standby import Standby
 from twinloop.law.reports import sensed
 from twinloop.law.twin import Twin
 from twinloop.signals import Bounds, Signals
@@ -43,11 +44,13 @@ class Guard:
     `trajectory` has the flight up to there.
 
     For the fallback, a reading that cannot be trusted is replaced by the twin's prediction from the previous reading.
+    Until the guard trips a fallback with a memory runs along on the readings that can be trusted, with its answers
+    discarded, so that it takes over a steady load. With `reset()` it begins from rest.
 
     Args:
         test: to fly.
-        fallback: a controller for the same signals, or a command that is safe to hold (n_u,), in its units and within
-            its bounds.
+        fallback: a controller for the same signals, whose `command` is called in each period, before the guard trips,
+            too; or a command that is safe to hold (n_u,), in its units and within its bounds.
         twin: for the prediction and the band; None: only readings, envelope and clock are checked.
         flown: flights so far with their tests, on which the band is checked.
         horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
@@ -78,7 +81,7 @@ class Guard:
         self.test = test
         self.signals = test.family.signals
         n_x, n_u = self.signals.n_x, self.signals.n_u
-        self.fallback = _safe(fallback, self.signals)
+        self.fallback = fallback
         dt = self.signals.dt
         length = HORIZON * test.steps * dt if horizon is None else horizon
         self.horizon = round(at_least_zero("Guard, horizon (s)", length) / dt)
@@ -110,6 +113,16 @@ class Guard:
         self._commands = np.empty((test.steps, n_u))
         self.reset()
 
+    @property
+    def fallback(self) -> Controller | Floats:
+        """What commands once the guard has tripped; another one may be given before a flight."""
+        return self._fallback
+
+    @fallback.setter
+    def fallback(self, fallback: Controller | ArrayLike) -> None:
+        self._fallback = found = _safe(fallback, self.signals)
+        self._standby = Standby(found, self.test) if isinstance(found, Controller) else None
+
     def reset(self) -> None:
         """Clears the memory; call it at the start of every flight."""
         self.period = 0
@@ -124,8 +137,8 @@ class Guard:
         self._controller.reset()
         self._differences.reset()
         self._sensors.reset()
-        if isinstance(self.fallback, Controller):
-            self.fallback.reset()
+        if self._standby is not None:
+            self._standby.reset()
         for ahead in self._aheads:
             ahead.reset()
         if self._band is not None:
@@ -173,10 +186,12 @@ class Guard:
                 self._states[self.period] = reading
             if self.period < self.test.steps:
                 self._commands[self.period] = command
-        elif isinstance(self.fallback, Controller):
-            command = self.fallback.command(reading, goal)
+            if self._standby is not None:
+                self._standby.follow(reading, goal)
+        elif self._standby is not None:
+            command = self._standby.command(reading, goal, self._broken)
         else:
-            command = self.fallback.copy()
+            command = np.array(self.fallback, dtype=np.float64)
         self._estimate = reading
         if self._aheads:
             next_one = self._aheads[-1].following(reading, command)
