@@ -5,6 +5,7 @@ import dataclasses
 import json
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -280,6 +281,31 @@ def test_a_host_that_others_see_gets_a_token_of_its_own(store):
     assert len(urlsplit(address).query) > 30
     with pytest.raises(tl.InvalidInput, match="16 characters"):
         prepared(str(store), 0, token="short")
+
+
+def test_a_machine_whose_name_does_not_resolve_is_served_all_the_same(store, monkeypatch):
+    def unknown(name):
+        raise socket.gaierror(-2, "Name or service not known")
+
+    monkeypatch.setattr(socket, "gethostbyname_ex", unknown)
+    with served(store, host="0.0.0.0") as address:
+        assert urlsplit(address).hostname == "127.0.0.1"
+        assert call(address, "GET", f"/c/1?{urlsplit(address).query}")[0] == 200
+
+
+def test_a_machine_answers_under_the_address_at_which_it_is_reached_and_no_other(store, monkeypatch):
+    monkeypatch.setattr(socket, "gethostname", lambda: "rig-pc")
+    monkeypatch.setattr(socket, "gethostbyname_ex", lambda name: (name, [], ["127.0.1.1"]))
+    with served(store, host="0.0.0.0") as address:
+        here = urlsplit(address)
+        assert here.hostname == "rig-pc"
+        # All of 127/8 is this machine: an address that nobody has told of, as that of a network is.
+        reached = f"http://127.0.0.77:{here.port}/"
+        path = f"/c/1?{here.query}"
+        assert call(reached, "GET", path)[0] == 200
+        assert call(reached, "GET", path, Host=f"rig-pc:{here.port}")[0] == 200
+        for other in ("127.0.0.78", "192.168.1.5", "evil.example", "127.0.0.77.evil.example", "[127.0.0.77]"):
+            assert call(reached, "GET", path, Host=f"{other}:{here.port}")[0] == 421
 
 
 def test_a_store_that_is_none_and_a_port_that_is_taken_are_refused(store, tmp_path):

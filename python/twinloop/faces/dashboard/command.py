@@ -90,11 +90,24 @@ def prepared(
     name = f"[{host}]" if ":" in host else host
     named = (*LOOPBACK, name) if here or host in ("0.0.0.0", "::") else (name,)
     if host in ("0.0.0.0", "::"):
-        named = (*named, socket.gethostname(), *(socket.gethostbyname_ex(socket.gethostname())[2]))
-        name = socket.gethostname()
+        own, addresses = socket.gethostname(), _addresses()
+        named = (*named, own, *addresses)
+        # A name that this machine itself cannot resolve opens nothing.
+        name = own if addresses else "[::1]" if ":" in host else "127.0.0.1"
     config = uvicorn.Config(application(desk, named, secret), log_level="warning", server_header=False)
     address = f"http://{name}:{bound.getsockname()[1]}/" + (f"?token={secret}" if secret else "")
     return Bound(uvicorn.Server(config), bound), address
+
+
+def _addresses() -> list[str]:
+    """Addresses that this machine's own name stands for; none where it does not resolve.
+
+    Often it is one of loopback alone. The fence knows under which address of the machine a request has come.
+    """
+    try:
+        return socket.gethostbyname_ex(socket.gethostname())[2]
+    except (OSError, UnicodeError):
+        return []
 
 
 class Bound:

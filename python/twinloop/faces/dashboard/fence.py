@@ -28,8 +28,9 @@ class Fence:
     """Stands before an application of ASGI.
 
     A name that is not the server's own is refused, so that no page elsewhere can reach it under a name that it has made
-    point here. What changes anything has to come from a page of the server's own. Where there is a token, it has
-    to be known: it comes in the address once, and in a cookie from then on.
+    point here. Where there is a token, the address at which the request has arrived is the server's own, too: no page
+    elsewhere has that. What changes anything has to come from a page of the server's own. Where there is a token, it
+    has to be known: it comes in the address once, and in a cookie from then on.
 
     Args:
         app: behind it.
@@ -63,7 +64,7 @@ class Fence:
 
     def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> tuple[int, str] | None:
         host = headers.get("host", "")
-        if _name(host) not in self.hosts:
+        if _name(host) not in self.hosts and not (self.token and _name(host) == _arrived(scope)):
             return 421, "Expected the server's own name in the address, found another one."
         if scope["method"] not in ("GET", "HEAD"):
             origin = headers.get("origin")
@@ -95,6 +96,15 @@ class Fence:
 def _name(host: str) -> str:
     name, _, port = host.lower().rpartition(":")
     return name if name and port.isdecimal() else host.lower()
+
+
+def _arrived(scope: Scope) -> str | None:
+    """The address of this machine at which a request has arrived, as a browser writes it; None where it is unknown."""
+    server = scope.get("server")
+    if not server or not server[0]:
+        return None
+    address = str(server[0]).lower().partition("%")[0]
+    return f"[{address}]" if ":" in address else address
 
 
 def _asked(scope: Scope) -> list[str]:

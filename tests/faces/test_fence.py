@@ -1,0 +1,44 @@
+"""The fence of the dashboard: under which names it answers, and to whom."""
+
+import asyncio
+
+import pytest
+
+pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
+
+from twinloop.faces.dashboard.fence import COOKIE, Fence
+
+TOKEN = "a-secret-that-is-long"
+KNOWN = f"{COOKIE}={TOKEN}"
+
+
+async def behind(scope, receive, send):
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b""})
+
+
+def status(fence, method="GET", server=("127.0.0.1", 8731), **headers):
+    """Status of the answer to a request."""
+    sent = []
+
+    async def send(message):
+        sent.append(message)
+
+    pairs = [(name.encode(), value.encode("latin-1")) for name, value in headers.items()]
+    scope = {"type": "http", "method": method, "headers": pairs, "query_string": b"", "server": server}
+    asyncio.run(fence(scope, None, send))
+    return sent[0]["status"]
+
+
+@pytest.mark.parametrize(
+    ("server", "host"),
+    [("192.168.1.5", "192.168.1.5:8731"), ("fe80::1%eth0", "[fe80::1]:8731"), ("fd00::A", "[fd00::a]")],
+)
+def test_where_a_token_is_asked_for_the_address_of_the_machine_is_a_name_of_its_own(server, host):
+    fence, open_to_all = Fence(behind, ["rig-pc"], TOKEN), Fence(behind, ["rig-pc"])
+    assert status(fence, server=(server, 8731), host=host, cookie=KNOWN) == 200
+    assert status(fence, server=(server, 8731), host=host) == 401
+    assert status(open_to_all, server=(server, 8731), host=host) == 421
+    for other in ("evil.example", "192.168.1.6", "[fe80::2]", ""):
+        assert status(fence, server=(server, 8731), host=other, cookie=KNOWN) == 421
+        assert status(fence, server=None, host=other, cookie=KNOWN) == 421
