@@ -42,3 +42,24 @@ def test_where_a_token_is_asked_for_the_address_of_the_machine_is_a_name_of_its_
     for other in ("evil.example", "192.168.1.6", "[fe80::2]", ""):
         assert status(fence, server=(server, 8731), host=other, cookie=KNOWN) == 421
         assert status(fence, server=None, host=other, cookie=KNOWN) == 421
+
+
+@pytest.mark.parametrize(
+    "others",
+    ["theme=dark; {}", 'prefs={{"a": 1}}; {}', '{}; prefs={{"a": 1}}', "a b=1; {}", "x=é; {}", "foo; {}", "k[0]=1; {};",
+     "tz=Europe/Paris (CET);{}", f"{COOKIE}=another; {{}}"],
+)  # fmt: skip
+def test_the_token_is_known_whatever_other_cookies_the_host_has(others):
+    fence = Fence(behind, ["rig-pc"], TOKEN)
+    assert status(fence, host="rig-pc:8731", cookie=others.format(KNOWN)) == 200
+    for wrong in (f"{COOKIE}=another", COOKIE, f"{COOKIE}={TOKEN}x", f"x{KNOWN}", f"x={KNOWN}"):
+        assert status(fence, host="rig-pc:8731", cookie=others.format(wrong)) == 401
+
+
+@pytest.mark.parametrize("origin", ["http://[", "http://rig-pc:8731]", "null", "", "http://rig-pc:1"])
+def test_an_origin_that_is_no_address_of_the_server_is_foreign(origin):
+    fence = Fence(behind, ["rig-pc"], TOKEN)
+    said = {"host": "rig-pc:8731", "cookie": KNOWN}
+    assert status(fence, "POST", origin=origin, **said) == 403
+    assert status(fence, "POST", **said) == 403
+    assert status(fence, "POST", origin="http://rig-pc:8731", **said) == 200

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping, Sequence
-from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -68,8 +67,7 @@ class Fence:
             return 421, "Expected the server's own name in the address, found another one."
         if scope["method"] not in ("GET", "HEAD"):
             origin = headers.get("origin")
-            own = origin is not None and urlsplit(origin).netloc.lower() == host.lower()
-            if not own or headers.get("sec-fetch-site", "same-origin") != "same-origin":
+            if not _is_of(origin, host) or headers.get("sec-fetch-site", "same-origin") != "same-origin":
                 return 403, "Expected a page of this dashboard, found another origin."
         if self.token and not self._knows(scope, headers):
             return (
@@ -79,13 +77,8 @@ class Fence:
         return None
 
     def _knows(self, scope: Scope, headers: Mapping[str, str]) -> bool:
-        jar: SimpleCookie = SimpleCookie()
-        try:
-            jar.load(headers.get("cookie", ""))
-        except CookieError:
-            return False
-        given = [jar[COOKIE].value] if COOKIE in jar else []
-        return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in (*given, *_asked(scope)))
+        given = (*_kept(headers.get("cookie", "")), *_asked(scope))
+        return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in given)
 
     def _cookie(self, scope: Scope) -> list[tuple[bytes, bytes]]:
         if not self.token or self.token not in _asked(scope):
@@ -105,6 +98,23 @@ def _arrived(scope: Scope) -> str | None:
         return None
     address = str(server[0]).lower().partition("%")[0]
     return f"[{address}]" if ":" in address else address
+
+
+def _is_of(origin: str | None, host: str) -> bool:
+    """Whether an origin is that of a page of this server; one that is no address is foreign."""
+    try:
+        return origin is not None and urlsplit(origin).netloc.lower() == host.lower()
+    except ValueError:
+        return False
+
+
+def _kept(cookies: str) -> list[str]:
+    """Tokens among the cookies of a request.
+
+    All ports of a host share their cookies, so others stand beside, in any form: those are passed over, not read.
+    """
+    pairs = (each.partition("=") for each in cookies.split(";"))
+    return [value.strip() for name, _, value in pairs if name.strip() == COOKIE]
 
 
 def _asked(scope: Scope) -> list[str]:
