@@ -258,18 +258,12 @@ class Guard:
     def _watch(self, reading: Floats) -> None:
         """Trips on the first thing that is wrong."""
         missing, frozen = self._sensors.missing(reading), self._sensors.frozen(reading)
-        if self._rounded is not None and self.period <= self.test.steps and not missing.any():
-            self._states[self.period] = reading
-            flown = self._states[: self.period + 1], self._commands[: self.period]
-            frozen |= self._rounded.frozen(*flown, self._sensors.repeated)
         states = self.signals.states
         self._last = None if missing.any() else reading.copy()
         if missing.any() or frozen.any():
             self._broken = missing | frozen
             i = int(np.argmax(self._broken))
-            if not missing[i] and self._sensors.pitches[i] > 0.0:
-                what = "has not changed for too long, though by the twin it should have moved"
-            elif not missing[i]:
+            if not missing[i]:
                 what = "has not changed in its last bit for too long"
             elif not np.isfinite(reading[i]):
                 what = "is not a finite number"
@@ -294,6 +288,17 @@ class Guard:
             return self._trip(
                 f"readings were outside of the twin's band for too long, {count} periods in a row now"
             )
+        if self._rounded is not None and self._band is not None and self.period <= self.test.steps:
+            # Outside of its band a reading is the band's affair.
+            self._states[self.period] = reading
+            flown = self._states[: self.period + 1], self._commands[: self.period]
+            still = self._rounded.frozen(*flown, self._sensors.repeated)
+            if still.any() and not self._band.outside:
+                self._broken = still
+                name = states[int(np.argmax(still))].name
+                return self._trip(
+                    f"the reading of {name} has not changed for too long, though by the twin it should have moved"
+                )
         if self._aheads and self.period < self.test.steps:
             near = self.signals.continued(reading[np.newaxis], self._middle)[0]
             found = self._aheads[0].leaving(near, self.horizon)
