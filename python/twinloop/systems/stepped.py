@@ -104,15 +104,15 @@ class Stepped(System):
         if self.noise.any():
             shape = (test.steps + 1, self._signals.n_x)
             noise = self.noise * run_stream(self.seed, self.runs).standard_normal(shape)
-        guard = Guard(episode, self._signals.n_x)
+        checked = CheckedStep(episode, self._signals.n_x)
         with closing(episode):
             try:
-                flown = fly(guard, dataclasses.replace(test, initial_state=episode.start), noise=noise)
+                flown = fly(checked, dataclasses.replace(test, initial_state=episode.start), noise=noise)
             except SystemFailure:
                 raise
             except Exception:
-                if guard.failure is not None:
-                    raise guard.failure from guard.failure.__cause__
+                if checked.failure is not None:
+                    raise checked.failure from checked.failure.__cause__
                 raise
         self.runs += 1
         return episode.finished(flown)
@@ -154,11 +154,11 @@ def deviations(what: str, noise: Deviations, signals: Signals) -> Floats:
     return np.array([at_least_zero(f"{what} of {n}", one) for n, one in zip(names, found, strict=True)])
 
 
-class Guard:
+class CheckedStep:
     """A step function whose answers are checked and whose steps are counted.
 
     Args:
-        step: to be watched.
+        step: to be checked.
         n_x: number of states that it should answer with.
     """
 
