@@ -6,7 +6,7 @@ import json
 import re
 import tempfile
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,6 @@ MOST_WORDS = 10_000
 LOGS = (".csv", ".npz")
 LONGEST_NAME = 100
 """Characters of a log's name in a message."""
-Handler = Callable[[Request], Awaitable[Response]]
 
 
 def application(desk: Desk, hosts: tuple[str, ...], token: str = "") -> App:

@@ -222,14 +222,6 @@ class Figure:
         write_whole(where, picture(self, where.suffix.lower()[1:]))
 
 
-@dataclass(frozen=True)
-class Extent:
-    """What marks cover: the least and the most of x and y that are finite."""
-
-    x: tuple[float, float]
-    y: tuple[float, float]
-
-
 def _kind(mark: Mark) -> str:
     if isinstance(mark, Line) and not mark.joined:
         return "dots"
