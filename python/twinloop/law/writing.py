@@ -74,6 +74,18 @@ class Written(NamedTuple):
         )
 
 
+def free_prefix(symbols: Sequence[str]) -> str:
+    """What the names of parts may begin with, so that none is a symbol: "t", with as many underscores as it takes.
+
+    Args:
+        symbols: names that are taken.
+    """
+    prefix = "t"
+    while any(symbol.startswith(prefix) and symbol[len(prefix) :].isdigit() for symbol in symbols):
+        prefix += "_"
+    return prefix
+
+
 class Writer:
     """Writes nodes; parts that are used several times, or are long, are written by name.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from twinloop.law.exports.c_words import number
 from twinloop.law.exports.python_source import joined, stepped_roots
 from twinloop.law.law import Law
-from twinloop.law.writing import EXACT, Dialect, Writer, decimal
+from twinloop.law.writing import EXACT, Dialect, Writer, decimal, free_prefix
 
 KEYWORDS = frozenset(
     """
@@ -55,11 +55,8 @@ def outputs_c(law: Law, name: str, precision: str) -> str:
         number=lambda value, digits: decimal(value, digits) + f,
     )
     symbols = [f"{symbol}_" if symbol in KEYWORDS else symbol for symbol in law.symbols]
-    prefix = "t"
-    while any(symbol.startswith(prefix) and symbol[len(prefix) :].isdigit() for symbol in symbols):
-        prefix += "_"
     roots = stepped_roots(law)
-    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, dialect)
+    writer = Writer(law.expressions, roots, symbols, EXACT, free_prefix(symbols), True, dialect)
     needed = {
         int(law.expressions[number].value)
         for number in law.expressions.needed(roots)

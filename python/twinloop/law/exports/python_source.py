@@ -10,7 +10,7 @@ from twinloop.law.exports.sensor_source import sensor_layout, sensor_source
 from twinloop.law.exports.step_source import step_source
 from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
-from twinloop.law.writing import EXACT, Dialect, Term, Writer
+from twinloop.law.writing import EXACT, Dialect, Term, Writer, free_prefix
 
 PYTHON = Dialect(
     {
@@ -306,10 +306,7 @@ def outputs_source(law: Law, dialect: Dialect, taken: Sequence[str]) -> str:
     """
     roots = stepped_roots(law)
     symbols = [f"{name}_" if name in taken or name.startswith("_") else name for name in law.symbols]
-    prefix = "t"
-    while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in symbols):
-        prefix += "_"
-    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, dialect)
+    writer = Writer(law.expressions, roots, symbols, EXACT, free_prefix(symbols), True, dialect)
     states, seen = symbols[: law.signals.n_x], symbols[law.signals.n_x :]
     lines = [
         "",

@@ -15,7 +15,7 @@ from twinloop.law.exports.python_source import equation_roots, joined
 from twinloop.law.expressions import Expressions
 from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
-from twinloop.law.writing import EXACT, Dialect, Term, Writer
+from twinloop.law.writing import EXACT, Dialect, Term, Writer, free_prefix
 
 SYMPY = Dialect({
     "abs": "sp.Abs({})", "sqrt": "sp.sqrt(sp.Abs({}))", "min": "sp.Min({}, {})", "max": "sp.Max({}, {})",
@@ -41,10 +41,7 @@ def sympy_source(law: Law) -> str:
     """
     roots = equation_roots(law)
     symbols = [f"{symbol}_" if symbol in TAKEN else symbol for symbol in law.symbols]
-    prefix = "t"
-    while any(symbol.startswith(prefix) and symbol[len(prefix) :].isdigit() for symbol in symbols):
-        prefix += "_"
-    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, SYMPY)
+    writer = Writer(law.expressions, roots, symbols, EXACT, free_prefix(symbols), True, SYMPY)
     n_x, n_u = law.signals.n_x, law.signals.n_u
     groups = dict(
         zip(TAKEN[1:4], (symbols[:n_x], symbols[n_x : n_x + n_u], symbols[n_x + n_u :]), strict=True)
