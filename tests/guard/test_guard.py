@@ -187,6 +187,26 @@ def test_a_flight_that_would_leave_is_ended_before_it_does_and_the_fallback_keep
     assert same_bits(told.states, states[: at + 1]) and same_bits(told.commands, commands[:at])
 
 
+@pytest.mark.parametrize(
+    ("seconds", "periods"), [(0.0, 0), (1e-6, 1), (0.02, 1), (0.05, 1), (0.051, 2), (0.15, 3), (0.3, 6)]
+)
+def test_a_horizon_is_rounded_up_and_only_none_at_all_looks_at_nothing(campaign, seconds, periods):
+    test = campaign.test(WILD, excitation=None)
+    guard = campaign.guard(test, horizon=seconds, clock=None)
+    assert guard.horizon == periods and bool(guard._aheads) == (periods > 0)
+    guard.command([1.25, 3.0], test.target(0))
+    assert ("angle would leave its envelope in 0.05 s" in guard.reason) == (periods > 0)
+
+
+@given(periods=st.integers(0, 2000), dt=st.sampled_from([0.001, 0.004, 0.01, 0.02, 0.05, 0.1, 0.3, 1 / 30]))
+def test_a_horizon_of_whole_periods_is_so_many(periods, dt):
+    test = new_campaign().test(GOOD, excitation=None)
+    signals = dataclasses.replace(SIGNALS, dt=dt)
+    test = dataclasses.replace(test, family=PENDULUM_CONTROLLER.bind(signals))
+    for seconds in (periods * dt, sum([dt] * periods)):
+        assert Guard(test, [0.0], horizon=seconds, clock=None).horizon == periods
+
+
 def test_nothing_changes_where_nothing_is_wrong_and_a_guard_can_fly_again(campaign):
     test = campaign.test(GOOD)
     guard = campaign.guard(test, clock=None)

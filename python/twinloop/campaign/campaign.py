@@ -399,7 +399,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             test: that is flown.
             fallback: gains by name; or a command that is safe to hold (n_u,), in its units. None: the first controller
                 that is known to fly (`trusted`), or, before any has flown, the test's own without its excitation.
-            horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
+            horizon: of the prediction, s, rounded up to whole periods; 0: no prediction. None: a fifth of the test.
             false_alarms: share of flights that the check of the band may end without cause, by the committee's own
                 prediction.
             overrun: share of the period by which a period may be late.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -53,7 +54,7 @@ class Guard:
             too; or a command that is safe to hold (n_u,), in its units and within its bounds.
         twin: for the prediction and the band; None: only readings, envelope and clock are checked.
         flown: flights so far with their tests, on which the band is checked.
-        horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
+        horizon: of the prediction, s, rounded up to whole periods; 0: no prediction. None: a fifth of the test.
         false_alarms: share of flights that the check of the band ends without cause, by the committee's own
             prediction.
         overrun: share of the period by which a period may be late.
@@ -84,7 +85,7 @@ class Guard:
         self.fallback = fallback
         dt = self.signals.dt
         length = HORIZON * test.steps * dt if horizon is None else horizon
-        self.horizon = round(at_least_zero("Guard, horizon (s)", length) / dt)
+        self.horizon = _periods(at_least_zero("Guard, horizon (s)", length), dt)
         self.overrun = at_least_zero("Guard, overrun (share of the period)", overrun)
         share = number("Guard, false_alarms (share of flights)", false_alarms, above=0.0)
         if share >= 1.0:
@@ -335,6 +336,14 @@ class Guard:
             return reading
         before = self.test.initial_state if self._estimate is None else self._estimate
         return np.where(wrong, before, reading)
+
+
+def _periods(seconds: float, dt: float) -> int:
+    """Periods that cover a time: one of any length that is not 0 has one."""
+    periods = seconds / dt
+    # 0.3 s are six periods of 0.05 s, whatever rounding adds to them.
+    whole = round(periods)
+    return whole if math.isclose(periods, whole, rel_tol=1e-9) else math.ceil(periods)
 
 
 def _safe(fallback: Controller | ArrayLike, signals: Signals) -> Controller | Floats:
