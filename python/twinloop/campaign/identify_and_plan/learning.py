@@ -151,7 +151,7 @@ class Learner:
         if self.options.plain != self.options and doubted:
             rough = with_remark(told.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, told.answered(rough, number=2), two, told)
-        if asked is not None and self.options.earlier_twin and self._misses(answer, told):
+        if asked is not None and self.options.earlier_twin and not answer.explained:
             answer = or_foretold(answer, asked.identified, asked.experiments, told.answered)
         identified = answer.identified
         model = None if earlier is None else earlier.model
@@ -216,11 +216,7 @@ class Learner:
             return True
         everywhere = self._drawn(told.flights, 0)
         (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
-        return 2 * lasting < DRAWN and self._misses(answer, told)
-
-    def _misses(self, answer: Answer, told: Told) -> bool:
-        """Whether a law misses flights by more than noise and known disturbances explain."""
-        return not answer.explained or bool(answer.misses(told.flights, self.setup, self.workers))
+        return 2 * lasting < DRAWN and bool(answer.misses(told.flights, self.setup, self.workers))
 
     def _known_again(self, told: Told, known: Identified, begun: UnderWay | None) -> Answer:
         """The law known before, tuned on all flights: wrong and late readings, and the form, are of the search anew."""
