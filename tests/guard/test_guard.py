@@ -207,6 +207,42 @@ def test_a_horizon_of_whole_periods_is_so_many(periods, dt):
         assert Guard(test, [0.0], horizon=seconds, clock=None).horizon == periods
 
 
+CALM, FAST, AT_THE_EDGE = [0.5, 0.0], [1.05, 4.7], [1.25, 3.0]
+"""Readings: from the second one the pendulum leaves after some periods, from the third one in the next."""
+
+
+def watched_ahead():
+    """A guard with nothing but readings, envelope and look-ahead, and how it has been when it was given readings."""
+    twin = tl.Twin(MEMBERS[0], SIGNALS, members=MEMBERS)
+    test = new_campaign().test(GOOD, excitation=None)
+    guard = Guard(test, [0.0], twin=twin, horizon=0.3, clock=None)
+
+    def tripped_at(*readings):
+        guard.reset()
+        for reading in readings:
+            guard.command(reading, test.target(0))
+        return guard.tripped_at
+
+    assert guard._aheads[0].leaving(CALM, 6) is None and guard._aheads[0].leaving(AT_THE_EDGE, 6)[0] == 1
+    assert guard._aheads[0].leaving(FAST, 6)[0] > 1
+    return guard, tripped_at
+
+
+def test_what_would_leave_in_the_next_period_is_ended_at_once():
+    guard, tripped_at = watched_ahead()
+    assert (
+        tripped_at(CALM, AT_THE_EDGE, CALM) == 1
+        and "angle would leave its envelope in 0.05 s" in guard.reason
+    )
+
+
+def test_what_would_leave_later_is_ended_where_two_periods_in_a_row_say_so():
+    guard, tripped_at = watched_ahead()
+    assert tripped_at(CALM, FAST, FAST, CALM) == 2 and "angle would leave its envelope in" in guard.reason
+    assert tripped_at(FAST, CALM, FAST, CALM, FAST, CALM) is None
+    assert tripped_at(CALM, FAST) is None and tripped_at(FAST) is None, "a flight before does not count"
+
+
 def test_nothing_changes_where_nothing_is_wrong_and_a_guard_can_fly_again(campaign):
     test = campaign.test(GOOD)
     guard = campaign.guard(test, clock=None)
@@ -280,10 +316,38 @@ def test_a_command_that_may_not_be_sent_is_no_fallback(wrong, words):
         assert guard.command([np.nan, 0.0], [0.8, 0.0]) == bound
 
 
-def test_a_controller_of_other_signals_is_no_fallback():
-    strong = dataclasses.replace(SIGNALS, commands=[tl.Command("torque", "N m", bounds=(-50.0, 50.0))])
-    with pytest.raises(tl.InvalidInput, match="signals of the test"):
-        Guard(new_campaign().test(GOOD), PENDULUM_CONTROLLER.bind(strong).controller([6.0, 0.0, 0.0]))
+@pytest.mark.parametrize(
+    ("what", "signals"),
+    [
+        (
+            "states",
+            dataclasses.replace(
+                SIGNALS,
+                states=(
+                    dataclasses.replace(ANGLE, name="heading"),
+                    dataclasses.replace(RATE, derivative_of="heading"),
+                ),
+            ),
+        ),
+        (
+            "periodic states",
+            dataclasses.replace(SIGNALS, states=(dataclasses.replace(ANGLE, periodic=True), RATE)),
+        ),
+        (
+            "commands",
+            dataclasses.replace(SIGNALS, commands=[tl.Command("torque", "N m", bounds=(-50.0, 50.0))]),
+        ),
+        ("commands", dataclasses.replace(SIGNALS, commands=[tl.Command("force", "N", bounds=(-2.0, 2.0))])),
+        ("period", dataclasses.replace(SIGNALS, dt=0.1)),
+    ],
+)
+def test_a_controller_of_other_signals_is_no_fallback(what, signals):
+    family = tl.controllers.StateFeedback(None, (-9.0, 9.0)).bind(signals)
+    with pytest.raises(tl.InvalidInput, match=f"a controller with the {what} .* signals of the test"):
+        Guard(new_campaign().test(GOOD), family.controller([6.0, 0.0]))
+
+
+def test_a_controller_of_the_same_signals_with_other_envelopes_is_a_fallback():
     Guard(new_campaign().test(GOOD), PENDULUM_CONTROLLER.bind(PENDULUM_SIGNALS).controller([6.0, 0.0, 0.0]))
 
 
@@ -402,7 +466,21 @@ def test_a_reading_that_nobody_records_is_none_and_no_controller_sees_it(garbage
 def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_flight(campaign):
     # Where it is long at its target: before that the band would be the first to notice.
     test = dataclasses.replace(campaign.test(GOOD, excitation=None), steps=80)
-    guard = campaign.guard(test, horizon=0.0, clock=None)
+    seen, sent = [], []
+
+    class Seeing:
+        def __init__(self, kp):
+            pass
+
+        def reset(self):
+            pass
+
+        def command(self, state, target):
+            seen.append(np.array(state))
+            return [2.0 * (target[0] - state[0]) - 0.3 * state[1]]
+
+    family = tl.controllers.Custom(Seeing, {"kp": (0.0, 1.0)}).bind(SIGNALS)
+    guard = campaign.guard(test, family.controller([0.0]), horizon=0.05, clock=None)
     random = np.random.default_rng(0)
 
     stuck = []
@@ -410,11 +488,24 @@ def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_fligh
     def sensor(k, x):
         reading = x + random.normal(size=2) * NOISE
         stuck.append(reading[1])
-        return np.array([reading[0], stuck[60]]) if k >= 60 else reading
+        reading = np.array([reading[0], stuck[60]]) if k >= 60 else reading
+        sent.append(reading)
+        return reading
 
-    fly(guard, test, sensor)
+    _, commands = fly(guard, test, sensor)
     # The first of them is a reading like others.
     assert guard.tripped_at == 65 and "rate has not changed" in guard.reason
+    # From then on the fallback sees the angle that is read, and the rate that the twin expects after that.
+    assert len(seen) == test.steps
+    found, read = np.array(seen[65:]), np.array(sent[65:])
+    assert same_bits(found[:, 0], read[:, 0]) and not (found[:, 1] == stuck[60]).any()
+    before, member = [sent[64], *found[:-1]], campaign.twin.members[0]
+    expected = [
+        member.step([x], [u], past=commands[: 64 + k].reshape(1, -1, 1))[0][1]
+        for k, (x, u) in enumerate(zip(before, commands[64:-1], strict=True))
+    ]
+    # The guard knows by how many ms the one sensor is read later than the other; a step alone does not.
+    np.testing.assert_allclose(found[:, 1], expected, atol=0.01)
 
 
 def test_a_sensor_whose_flights_repeat_readings_is_not_taken_for_frozen():
@@ -506,6 +597,20 @@ def test_before_anything_is_known_readings_and_envelope_are_watched():
         guard.command([angle, 0.0], test.target(0))
     assert guard.tripped_at == 2 and "angle has left its envelope: 1.31 rad" in guard.reason
     assert not new_campaign().guard(test, clock=None).tripped
+
+
+def test_a_twin_that_does_not_follow_the_flights_watches_nothing(campaign, monkeypatch):
+    test = campaign.test(WILD, excitation=None)
+    assert campaign.twin.follows
+    guard = campaign.guard(test, clock=None)
+    assert guard._aheads and guard._band is not None
+    monkeypatch.setattr(campaign.twin, "follows", False)
+    guard = campaign.guard(test, clock=None)
+    assert not guard._aheads and guard._band is None
+    guard.command(AT_THE_EDGE, test.target(0))
+    assert not guard.tripped
+    fly(guard, test)
+    assert "angle has left its envelope" in guard.reason, "which is watched all the same"
 
 
 ENVELOPES = st.tuples(st.floats(-20.0, 20.0), st.floats(0.1, 9.0)).map(lambda found: (found[0], sum(found)))
@@ -656,16 +761,30 @@ class OwnLoop(tl.System):
 
     signals = SIGNALS
 
-    def __init__(self, watched=True, lost=False):
-        self.watched, self.lost = watched, lost
+    def __init__(self, watched=True, lost=False, asks=None):
+        self.watched, self.lost, self.asks = watched, lost, asks
 
     def run(self, test):
         law = test.controller() if self.watched else new_campaign().test(GOOD, excitation=None).controller()
+        if self.asks is not None:
+            law = self.only_begun(law)
         states, commands = fly(law, test, lambda k, x: x if k < 6 else np.array([1.4, 0.0]))
         if self.lost:
             raise tl.SystemFailure("the link was lost")
         band = np.stack([states - 1.0, states + 1.0])
         return tl.Trajectory(0.05 * np.arange(len(states)), states, commands, band=band)
+
+    def only_begun(self, law):
+        """Asks for so many commands, and holds the last one."""
+        commands, asks = [], self.asks
+
+        class Held:
+            def command(self, state, target):
+                if len(commands) < asks:
+                    commands.append(law.command(state, target))
+                return commands[-1]
+
+        return Held()
 
 
 def guarded_by_hand(system):
@@ -683,6 +802,15 @@ def test_a_system_that_asks_no_guard_is_refused_and_its_run_is_not_lost():
     with pytest.raises(tl.InvalidInput, match=r"asked 0 times in 30 periods"):
         guarded.run(new_campaign().test(GOOD, excitation=None))
     assert guarded.flown.steps == 30
+
+
+@pytest.mark.parametrize("asks", [1, 15, 29])
+def test_a_system_that_asks_for_too_few_commands_is_refused(asks):
+    guarded = guarded_by_hand(OwnLoop(asks=asks))
+    with pytest.raises(tl.InvalidInput, match=rf"asked {asks} times in 30 periods"):
+        guarded.run(new_campaign().test(GOOD, excitation=None))
+    assert guarded.flown.steps == 30
+    assert guarded_by_hand(OwnLoop(asks=30)).run(new_campaign().test(GOOD, excitation=None)).steps == 6
 
 
 def test_after_a_run_that_failed_the_guard_is_the_one_of_that_run():

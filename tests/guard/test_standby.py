@@ -96,6 +96,18 @@ def test_what_takes_over_with_the_same_gains_goes_on_with_the_same_bits(name):
             assert same_bits(found, expected)
 
 
+@pytest.mark.parametrize("gains", [[1.5, 0.5, 1.2], [2.0, 0.6, 2.0]])
+def test_a_second_flight_of_a_guard_is_the_first_one_again(gains):
+    family, clock = BOUND["pid"], [0.0]
+    test = flight(family, np.array([1.5, 0.5, 1.2]))
+    guard = Guard(test, family.controller(gains), clock=lambda: clock[0])
+    first = lift(guard, test.target(0), 0.8, clock)
+    guard.reset()
+    for found, expected in zip(lift(guard, test.target(0), 0.8, clock), first, strict=True):
+        assert same_bits(found, expected)
+    assert guard.tripped_at == LATE
+
+
 def test_without_an_integral_in_the_test_none_winds_up_in_the_fallback():
     family = BOUND["pid"]
     test = flight(family, np.array([4.0, 0.0, 2.0]))
