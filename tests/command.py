@@ -19,6 +19,8 @@ def twinloop_command(*arguments, **how):
 def hearing_ctrl_c():
     """To be called in a new process: whoever started the tests in the background has them, and theirs, ignore it."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "SIGHUP"):  # as `nohup` has it
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def invoke(*arguments):

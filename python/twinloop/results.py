@@ -41,6 +41,7 @@ from twinloop.law.linear.margins import LoopMargins, Margins
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 from twinloop.law.reports import Computed, Held
+from twinloop.planning.proposal import Fared
 
 if TYPE_CHECKING:
     from twinloop.faces.figures.plots import Plots
@@ -69,6 +70,7 @@ __all__ = [
     "Experiment",
     "Expressions",
     "Failure",
+    "Fared",
     "FitTable",
     "Flights",
     "Frequency",

@@ -18,10 +18,11 @@ FRONTS = {
     "_ground": "arrays elementary loading rounding showing slopes steps streams texts times values versions writing",
     "autopilots": "declared files sweep",
     "campaign": (
-        "assessment campaign_file certificate cost excited from_logs history keeping presets provenance remaining setup"
+        "agreement assessment campaign_file certificate cost excited from_logs history keeping presets provenance "
+        "remaining setup"
     ),
     "campaign/coevolution": "method search",
-    "campaign/data": "begun declared gains lateness levels odd_one_out readings reports rows sent wrapped",
+    "campaign/data": "begun copies declared gains lateness levels odd_one_out readings reports rows sent wrapped",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "reaching rivals steps unseen use"

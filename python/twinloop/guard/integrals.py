@@ -122,14 +122,14 @@ class Integrals:
         of_test, of_fallback = own[:, len(states) :], other[:, len(states) :]
         if not of_fallback.any() or np.array_equal(of_test, of_fallback):
             return
-        ridge = RIDGE * float((of_fallback**2).sum()) * np.eye(len(integrals))
+        ridge = RIDGE * float(np.square(of_fallback).sum()) * np.eye(len(integrals))
         scales = solve_linear(product(of_fallback.T, of_fallback) + ridge, product(of_fallback.T, of_test))
         if scales is not None:
             self._scales[np.ix_(integrals, integrals)] = scales
         for i, gains in zip(integrals, of_fallback.T, strict=True):
             proportional = other[:, states.index(i)] if i in states else np.zeros(len(other))
-            size = float((gains**2).sum())
-            self._lasts(i, math.sqrt(float((proportional**2).sum()) / size) if size else math.inf, test)
+            size = float(np.square(gains).sum())
+            self._lasts(i, math.sqrt(float(np.square(proportional).sum()) / size) if size else math.inf, test)
 
     def _lasts(self, i: int, seconds: float, test: Test) -> None:
         """Has the integral of a state transferred as far as it lasted for so long; for longer than the test: not."""
