@@ -9,18 +9,13 @@ from pathlib import Path
 
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.campaign import Campaign
-from twinloop.campaign.campaign_file import read_file, read_signals, said_in
+from twinloop.campaign.campaign_file import SIGNALS, WHOLE, read_file, read_signals, said_in
 from twinloop.campaign.keeping import as_begun, check_setup
 from twinloop.controllers import UnboundFamily
 from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
-
-SIGNALS = ("dt", "states", "commands")
-"""Sections of a file that describes a system, whatever else it leaves out."""
-TASK = ("controller", "task", "first")
-"""The others of a campaign file."""
 
 
 def check_agreement(path: Path, known: Campaign, store: str, name: str) -> None:
@@ -40,7 +35,7 @@ def check_agreement(path: Path, known: Campaign, store: str, name: str) -> None:
         InvalidInput: they differ, or the file cannot be read.
     """
     said = said_in(path)
-    if "system" in said or said >= {*SIGNALS, *TASK}:
+    if "system" in said or said >= set(WHOLE):
         task = known.setup
         begun = Begun(
             known.signals,

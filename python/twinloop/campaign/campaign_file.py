@@ -36,6 +36,10 @@ SECTIONS = (
     *("dt", "lags", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options"),
     *("autopilot", "system", "log"),
 )
+SIGNALS = ("dt", "states", "commands")
+"""Sections of a file that describes a system, whatever else it leaves out."""
+WHOLE = (*SIGNALS, "controller", "task", "first")
+"""Those of a whole campaign file, where no system says what is left out."""
 TASK = ("initial_state", "target_state", "duration")
 CAMPAIGN = ("preset", "seed", "goal", "quality", "weights")
 TEMPLATE = """\
@@ -230,9 +234,8 @@ def read_file(path: str | Path, begun: System | None = None) -> CampaignFile:
     if "autopilot" in found:
         declared(found["autopilot"], f"File {path}")
     flies = system_section(found.get("system"))
-    needed = ("dt", "states", "commands", "controller", "task", "first")
     described = flies is None or "states" in found
-    _keys(found, SECTIONS, needed if flies is None else needed[:3] if described else (), str(path))
+    _keys(found, SECTIONS, WHOLE if flies is None else SIGNALS if described else (), str(path))
     signals = made = None
     if described:
         signals = _signals(found)
@@ -243,7 +246,7 @@ def read_file(path: str | Path, begun: System | None = None) -> CampaignFile:
                     f"Campaign file, {path}: expected [states] beside {key}, found none; add them, or leave {key}"
                     " out and take those of the system."
                 )
-    if flies is not None and not all(key in found for key in needed):
+    if flies is not None and not all(key in found for key in WHOLE):
         made = begun or system_named(flies.use, flies.arguments, signals, path.resolve().parent)
         signals = signals or made.signals
     own = made is not None and "task" not in found
@@ -272,9 +275,7 @@ def said_in(path: str | Path) -> set[str]:
     Raises:
         InvalidInput: no such file, no TOML, or an unknown section.
     """
-    found = _toml_of(Path(path))
-    _keys(found, SECTIONS, (), str(path))
-    return set(found)
+    return set(_sections_of(path))
 
 
 def read_signals(path: str | Path) -> tuple[Signals, Mapping[str, Any]]:
@@ -286,9 +287,7 @@ def read_signals(path: str | Path) -> tuple[Signals, Mapping[str, Any]]:
     Raises:
         InvalidInput: no such file, no TOML, an unknown key, or a value that cannot be used.
     """
-    path = Path(path)
-    found = _toml_of(path)
-    _keys(found, SECTIONS, ("dt", "states", "commands"), str(path))
+    found = _sections_of(path, SIGNALS)
     return _signals(found), _section(found, "options", None, ())
 
 
@@ -301,9 +300,14 @@ def read_fields(path: str | Path) -> Mapping[str, str]:
     Raises:
         InvalidInput: no such file, no TOML, or an unknown section.
     """
+    return _section(_sections_of(path), "log", None, ())
+
+
+def _sections_of(path: str | Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What a campaign file has, of known sections, and those that are needed among them."""
     found = _toml_of(Path(path))
-    _keys(found, SECTIONS, (), str(path))
-    return _section(found, "log", None, ())
+    _keys(found, SECTIONS, needed, str(path))
+    return found
 
 
 def _signals(found: Mapping[str, Any]) -> Signals:

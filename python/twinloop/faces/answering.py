@@ -9,6 +9,7 @@ import click
 from twinloop.faces.result import to_json
 from twinloop.faces.terminal import is_utf_8
 
+name_option = click.option("--name", help="Name of the campaign, if the store holds several.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 

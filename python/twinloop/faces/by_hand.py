@@ -14,7 +14,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable, at
-from twinloop.faces.answering import answer, json_option
+from twinloop.faces.answering import answer, json_option, name_option
 from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
@@ -59,7 +59,7 @@ def new(file: Path, as_json: bool) -> None:
 @click.option(
     "--batch", type=int, metavar="N", help="Plan N alternative tests, the best first; fly them in any order."
 )
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def ask(
@@ -146,7 +146,7 @@ def _shown(store: str, name: str | None, campaign: Campaign, test: Test) -> tupl
 )
 @click.option("--aborted", type=Path, metavar="FLIGHT", help="Log of a test that was stopped before its end.")
 @click.option("--reason", metavar="REASON", help="Required with --aborted: why it was stopped.")
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @json_option
 def tell(
     store: str,
@@ -235,7 +235,7 @@ def _aborted(store: str, name: str | None, test: int, log: Path, why: str) -> st
 @click.command()
 @click.argument("store")
 @click.argument("flight", type=Path)
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @json_option
 def attach(store: str, flight: Path, name: str | None, as_json: bool) -> None:
     """Add a recorded FLIGHT without a test, as CSV or .npz."""
@@ -252,7 +252,7 @@ def attach(store: str, flight: Path, name: str | None, as_json: bool) -> None:
 @click.command()
 @click.argument("store")
 @click.argument("test", type=int)
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @json_option
 def abandon(store: str, test: int, name: str | None, as_json: bool) -> None:
     """Mark a TEST as not to be flown."""

@@ -9,7 +9,7 @@ import click
 from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput, NotTrusted, unknown
-from twinloop.faces.answering import answer, json_option
+from twinloop.faces.answering import answer, json_option, name_option
 from twinloop.faces.opening import opened_to_look, say_if_changed
 from twinloop.law.exports.export import PRECISIONS, SUFFIXES
 from twinloop.law.twin import load_twin
@@ -29,7 +29,7 @@ WHAT = ("twin", "controller")
     type=click.Path(path_type=Path),
     help="File to write, its kind by the suffix; without it, the text of --to on standard output.",
 )
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @click.option("--precision", default="double", show_default=True, help=f"For C: {' or '.join(PRECISIONS)}.")
 @click.option(
     "--force", is_flag=True, help="Export also a twin that fails its checks, and skip the comparison."

@@ -15,6 +15,7 @@ from twinloop.autopilots.files import FORMATS
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_autopilot
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import name_option
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import opened_to_look
 
@@ -28,7 +29,7 @@ def for_an_autopilot(command: Command) -> Command:
         command: of click.
     """
     for option in (
-        click.option("--name", help="Name of the campaign, if the store holds several."),
+        name_option,
         click.option(
             "--mapping",
             type=Path,

@@ -14,6 +14,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import behind
 from twinloop.campaign.keeping import heading, look
 from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.answering import name_option
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
 from twinloop.faces.opening import say_if_changed
@@ -30,7 +31,7 @@ from twinloop.systems import BUILT_IN, Quadrotor
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @click.option("--experiments", type=int, help="Total number of runs; by default as first requested.")
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @patient
@@ -73,7 +74,7 @@ def resume(
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
@@ -90,7 +91,7 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(store: str, name: str | None, as_json: bool) -> None:
     """Show the contents of STORE; nothing is learnt or changed, and a writer is not delayed."""

@@ -13,7 +13,7 @@ from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment, Withdrawal
 from twinloop.errors import InvalidInput
-from twinloop.faces.answering import answer, json_option
+from twinloop.faces.answering import answer, json_option, name_option
 from twinloop.faces.telling import counted
 from twinloop.logs import read_log
 from twinloop.store import shown_name
@@ -29,7 +29,7 @@ ATTACHED = re.compile(r"attached-(\d+)")
 @click.option(
     "--reason", required=True, metavar="REASON", help="What was wrong with the flight, in a few words."
 )
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @json_option
 def withdraw(store: str, which: str, reason: str, name: str | None, as_json: bool) -> None:
     """Take back a flight that was recorded by mistake: nothing is learnt from it any more.

@@ -84,11 +84,23 @@ def crossed(test: Test, run: Trajectory) -> Iterator[Change]:
         names = signals.command_names[first], signals.command_names[second]
         yield Change(f"{names[0]} and {names[1]} exchanged", run.states, commands)
     for i, j in product(signals.measured, range(signals.n_u)):
-        states, commands = run.states.copy(), run.commands.copy()
-        states[:-1, i], commands[:, j] = run.commands[:, j], run.states[:-1, i]
-        words = f"{signals.state_names[i]} and {signals.command_names[j]} exchanged"
-        changed = _of_states(words, states, run, signals)
-        yield Change(words, changed.states, commands)
+        yield with_state(test, run, i, j)
+
+
+def with_state(test: Test, run: Trajectory, state: int, command: int) -> Change:
+    """A command exchanged with a state.
+
+    Args:
+        test: that the run is told as a flight of.
+        run: that was recorded.
+        state: its number; it is measured.
+        command: its number.
+    """
+    signals = test.signals
+    states, commands = run.states.copy(), run.commands.copy()
+    states[:-1, state], commands[:, command] = run.commands[:, command], run.states[:-1, state]
+    words = f"{signals.state_names[state]} and {signals.command_names[command]} exchanged"
+    return Change(words, _of_states(words, states, run, signals).states, commands)
 
 
 def nearest(test: Test, run: Trajectory, changes: Iterator[Change]) -> str:

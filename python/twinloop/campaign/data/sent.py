@@ -16,6 +16,7 @@ from twinloop.campaign.data.righted import (
     nearest,
     other_signs,
     other_units,
+    with_state,
 )
 from twinloop.campaign.data.rows import late_commands
 from twinloop.campaign.excited import (
@@ -33,7 +34,6 @@ from twinloop.campaign.history import Experiment
 from twinloop.remarks import Remark, note, serious
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
-from twinloop.unmeasured import completed_readings
 
 OTHER = 0.5
 """Share of what a command does, or all do on average, that may differ from what their controller gives, squared."""
@@ -172,13 +172,10 @@ def _exchanged_with_state(test: Test, run: Trajectory) -> tuple[str, str] | None
     signals = test.signals
     before = apart(*sent_and_asked(test, run), test)
     for j, i in product(np.flatnonzero(before > LITTLE * LITTLE).tolist(), signals.measured):
-        states, sent = run.states.copy(), run.commands.copy()
-        states[:-1, i], sent[:, j] = run.commands[:, j], run.states[:-1, i]
-        if signals.unmeasured:
-            states = completed_readings(states[:, signals.measured], signals, states[0])
-        asked = [given(as_excited(test, how), states) for how in hows(test)]
+        change = with_state(test, run, i, j)
+        asked = [given(as_excited(test, how), change.states) for how in hows(test)]
         # Unlike of two commands, there is one column alone to be held against the controller.
-        if NEARER * min(apart(sent, each, test)[j] for each in asked) <= before[j]:
+        if NEARER * min(apart(change.commands, each, test)[j] for each in asked) <= before[j]:
             return signals.state_names[i], signals.command_names[j]
     return None
 

@@ -15,13 +15,12 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.tame import NEARLY, TAME
+from twinloop.campaign.identify_and_plan.two_laws import LEAST
 from twinloop.identification.identified import Identified
 from twinloop.remarks import Remark, note
 
 HALF = 0.5
 """Mean squared error over that of a new law, geometric mean over flights, up to which an earlier one is far better."""
-LEAST = 1e-12
-"""Ratio of mean squares to those of the model that never moves, below which laws follow equally well."""
 BEFORE = note(
     "known-before",
     "The twin learnt from all flights misses some of them in free run by more than any disturbance explains; the"
@@ -105,7 +104,7 @@ def far_better(known: Floats, law: Floats, learnt: int) -> bool:
     if not np.isfinite(law).all():
         return True
     lead = log(np.maximum(law, LEAST)) - log(np.maximum(known, LEAST))
-    return bool(lead[learnt:].sum() > 0.0 and lead.mean() >= -float(log(np.array([HALF]))[0]))
+    return bool(lead[learnt:].sum() > 0.0 and lead.mean() >= -log(HALF))
 
 
 def or_lasted_before(rough: Answer, earlier: Identified, answered: Answered) -> Answer:

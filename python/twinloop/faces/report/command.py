@@ -8,7 +8,7 @@ import click
 
 from twinloop._ground.writing import write_whole
 from twinloop.errors import InvalidInput
-from twinloop.faces.answering import answer, json_option
+from twinloop.faces.answering import answer, json_option, name_option
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture
 from twinloop.faces.files import check_writable
@@ -23,7 +23,7 @@ from twinloop.store import shown_name
 
 @click.command()
 @click.argument("campaign")
-@click.option("--name", help="Name of the campaign, if the store holds several.")
+@name_option
 @click.option(
     "-o", "--output", type=Path, metavar="FILE.html|FOLDER", help="File to write; by default report.html."
 )

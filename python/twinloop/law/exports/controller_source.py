@@ -11,6 +11,7 @@ import numpy as np
 
 from twinloop._core import __version__
 from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import power
 from twinloop.controllers import PID, Cascade, Family, Mixer, StateFeedback, UnboundFamily
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.c_words import BEGIN_C, END_C, number
@@ -185,9 +186,11 @@ def _at_rest(described: UnboundFamily, signals: Signals) -> list[float]:
     """What a controller sends without any error (n_u,): that of its mixer for no output, or 0, within the bounds."""
     output = described.output if isinstance(described, (PID, Cascade, StateFeedback)) else None
     offset = np.zeros(signals.n_u) if output is None or output.offset is None else output.offset
-    power = 1.0 if output is None else output.power
+    exponent = 1.0 if output is None else output.power
     low, high = np.array([command.bounds for command in signals.commands]).T
-    sent: list[float] = np.clip(np.copysign(np.abs(offset) ** power, offset), low, high).tolist()
+    sent: list[float] = np.clip(
+        [math.copysign(power(abs(x), exponent), x) for x in offset], low, high
+    ).tolist()
     return sent
 
 
