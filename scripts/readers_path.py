@@ -43,6 +43,8 @@ import twinloop as tl
 from twinloop import _core
 
 PACKAGE = str(Path(tl.__file__).parent) + "/"
+SIDE_BY_SIDE = PACKAGE + "_ground/side_by_side.py"
+"""What is read as a list of what some work makes of each of several things, wherever that is done."""
 ENGINE = tuple(kind for kind in vars(_core).values() if isinstance(kind, type))
 CHARACTERS, DEEPEST, SAMPLES = 12, 12, 16
 LEFT_OUT = {"Signals", "Setup", "Pool", "Planner"}
@@ -101,6 +103,7 @@ class Watch:
             event not in ("call", "return")
             or not code.co_filename.startswith(PACKAGE)
             or code.co_name[0] == "<"
+            or code.co_filename == SIDE_BY_SIDE
         ):
             return
         if event == "call":

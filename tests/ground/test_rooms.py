@@ -15,7 +15,10 @@ MODULES = {
 # A file that is added here may be imported from outside its room; a file that no one imports any more leaves the list.
 FRONTS = {
     "_experiment": "envelope hold_back limits replay",
-    "_ground": "arrays elementary loading rounding showing slopes steps streams texts times values versions writing",
+    "_ground": (
+        "arrays elementary loading rounding showing side_by_side slopes steps streams texts times values versions"
+        " writing"
+    ),
     "autopilots": "declared files sweep",
     "campaign": (
         "agreement assessment campaign_file certificate cost excited from_logs history keeping presets provenance "

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
+from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.context import Context
 from twinloop.identification.description import shortest
 from twinloop.identification.evidence import CORRELATED
@@ -51,19 +52,21 @@ class Described:
         if fit is None or not fit.stable:
             return
         problem = Problem(context, hypothesis)
-        for i, found in enumerate(hypothesis.sums):
-            chain = found.chain
-            likelihood = _Likelihood(context, hypothesis, i, problem.integration(chain))
-            period = context.signals.dt if chain.integrated else 1.0
-            white = max(1e-3 * float(chain.sensors[0]), likelihood.integration) / period
-            quiet = chain.with_noise(chain.sensors, (white, 0.0, chain.motion.correlation_time))
-            begun = [quiet, chain] if chain.motion.correlated else [quiet]
-            likely, least = shortest([likelihood.climbed(one) for one in begun], lambda pair: pair[1])
+        likelihoods = [
+            _Likelihood(context, hypothesis, i, problem.integration(found.chain))
+            for i, found in enumerate(hypothesis.sums)
+        ]
+        noises = side_by_side(
+            lambda one: shortest([one.climbed(begun) for begun in one.begun], lambda pair: pair[1]),
+            likelihoods,
+            context.workers.threads,
+        )
+        for found, likelihood, (likely, least) in zip(hypothesis.sums, likelihoods, noises, strict=True):
             self.chains.append(likely)
             length += least + priced(
                 hypothesis.pool, list(found.weights), likelihood.readings, len(hypothesis.runs)
             )
-            self.gained += likelihood(chain) - least
+            self.gained += likelihood(found.chain) - least
         self.hypothesis = replace(hypothesis, fit=replace(fit, length=length))
 
     @property
@@ -85,8 +88,12 @@ class _Likelihood:
     """
 
     def __init__(self, context: Context, hypothesis: Hypothesis, i: int, integration: float) -> None:
-        self.context, self.hypothesis, self.i, self.integration = context, hypothesis, i, integration
-        chain, dt = hypothesis.sums[i].chain, context.signals.dt
+        self.context, self.hypothesis, self.i = context, hypothesis, i
+        dt, chain = context.signals.dt, hypothesis.sums[i].chain
+        white = max(1e-3 * float(chain.sensors[0]), integration) / (dt if chain.integrated else 1.0)
+        quiet = chain.with_noise(chain.sensors, (white, 0.0, chain.motion.correlation_time))
+        self.begun = [quiet, chain] if chain.motion.correlated else [quiet]
+        """Noise that the likeliest is climbed to from: hardly any, and what there is."""
         self.states = list(chain.states)
         self.counted = [run.weights[:, self.states] for run in hypothesis.runs]
         """Weights of the chain's readings, of each run."""

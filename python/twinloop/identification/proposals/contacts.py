@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.settling import settled
@@ -86,7 +87,12 @@ def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) 
     places = {entered(grown.pool, hinge, len(every)): hinge for hinge in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places), fit=None)
     problem, options, first = Problem(context, tried), context.options, tried.candidates.ladder[0]
-    below = [first_noise(problem, found.chain, first, options.gusts) for found in tried.sums]
+    usable = problem.usable(first)
+    below = side_by_side(
+        lambda found: first_noise(problem, found.chain, usable, options.gusts),
+        tried.sums,
+        context.workers.threads,
+    )
     walks = context.walks(tried.next_unit(context.unit), options.moves // 4)
     sums = search(problem, below, first, tried.sums, walks)
     near = (subset for found in sums for subset, above in found.subsets if above < NEAR)

@@ -7,13 +7,15 @@ limits of the rate are tried, those that the commands of the runs would have met
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import sqrt
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.side_by_side import side_by_side
+from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import by_evidence
 from twinloop.identification.hypothesis import Hypothesis
@@ -38,8 +40,8 @@ CLEARLY = 24.0
 """Units of χ² by which a limit of the rate must be worse than none for slower ones not to be tried."""
 GRID, RATES = 0, 1000
 """Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
-Trial = Callable[[Actuation], Hypothesis]
-"""The hypothesis behind other actuators, with sums of the first rung."""
+Trial = Callable[[Iterable[Actuation]], list[Hypothesis]]
+"""The hypothesis behind each of several other actuators, with sums of the first rung."""
 
 
 def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -49,7 +51,7 @@ def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("actuators")
     number = itertools.count()
     trial = _trials(context, hypothesis, number)
-    best = trial(Actuation.direct(context.signals))
+    (best,) = trial([Actuation.direct(context.signals)])
     for group in hypothesis.alike:
         best = _searched(context, trial, best, group)
     best = _without(trial, best)
@@ -78,7 +80,7 @@ def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothes
             continue
         split = replace(best, alike=one_by_one(best.alike, group))
         trial = _trials(context, split, number)
-        own = trial(best.actuation)
+        (own,) = trial([best.actuation])
         for i in group:
             own = _searched(context, trial, own, (i,))
         best = max([best, own], key=by_evidence)
@@ -121,8 +123,8 @@ def _ramped(
         for i in group:
             ramp = periods * context.signals.dt * context.signals.commands[i].size
             actuators[i] = actuators[i]._replace(lag=lag, ramp=ramp)
-        several.append(trial(replace(best.actuation, actuators=tuple(actuators))))
-    return max(several, key=by_evidence)
+        several.append(replace(best.actuation, actuators=tuple(actuators)))
+    return max(trial(several), key=by_evidence)
 
 
 def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int], of: int = GRID) -> Trial:
@@ -130,12 +132,17 @@ def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int], of:
     unit = context.unit.part(hypothesis.start, of)
     driven = [found.chain for found in hypothesis.sums]
 
-    def trial(actuation: Actuation) -> Hypothesis:
+    def behind_one(asked: tuple[Actuation, Unit]) -> Hypothesis:
+        actuation, own = asked
         behind = replace(hypothesis, actuation=actuation)
-        walks = context.walks(unit.part(next(number)), context.options.moves // 4)
+        walks = context.walks(own, context.options.moves // 4)
         terms, nothing = behind.candidates.ladder[0], [None] * len(driven)
         sums = search(Problem(context, behind), driven, terms, nothing, walks)
         return replace(behind, sums=tuple(sums))
+
+    def trial(several: Iterable[Actuation]) -> list[Hypothesis]:
+        asked = [(actuation, unit.part(next(number))) for actuation in several]
+        return side_by_side(behind_one, asked, context.workers.threads)
 
     return trial
 
@@ -148,10 +155,10 @@ def _best_lag(
     From no lag on a short one may describe runs worse, and a longer one better. A delay has to be better soon: behind
     one or two periods more even runs of a machine without any find some lag that suits their noise.
     """
-    found = best if delay else trial(best.actuation.at_once(group))
+    (found,) = [best] if delay else trial([best.actuation.at_once(group)])
     lag, worse = None if delay else 0.0, 0
     for tried in LAGS if delay else LAGS[1:]:
-        other = _at(context, trial, best, group, delay, tried)
+        other = _at(context, trial, best, group, delay, [tried])
         if other.evidence > found.evidence:
             found, lag, worse = other, tried, 0
         else:
@@ -162,7 +169,7 @@ def _best_lag(
     several = [best, found]
     if lag:
         # Of the steps of the grid one is larger than a period of delay, which would stand in for a lag between them.
-        several += [_at(context, trial, best, group, delay, lag * by) for by in (1.0 / FINER, FINER)]
+        several.append(_at(context, trial, best, group, delay, [lag * by for by in (1.0 / FINER, FINER)]))
     return max(several, key=by_evidence)
 
 
@@ -171,7 +178,7 @@ def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[in
     while not (now := best.actuation.actuators[group[0]]).direct and now.delay < MOST_DELAY:
         at_it: Hypothesis | None = None
         for lag in (lag for lag in reversed(LAGS) if lag * context.signals.dt <= now.lag):
-            tried = _at(context, trial, best, group, now.delay + 1, lag)
+            tried = _at(context, trial, best, group, now.delay + 1, [lag])
             if at_it is not None and max([at_it, tried], key=by_evidence) is at_it:
                 break
             at_it = tried
@@ -187,16 +194,17 @@ def _without(trial: Trial, best: Hypothesis) -> Hypothesis:
     """The best so far, or a better one in which groups act at once that stood in for those searched after them."""
     lagging = [group for group in best.alike if not best.actuation.actuators[group[0]].direct]
     for group in lagging if len(lagging) > 1 else ():
-        best = max([best, trial(best.actuation.at_once(group))], key=by_evidence)
+        best = max([best, *trial([best.actuation.at_once(group)])], key=by_evidence)
     return best
 
 
 def _at(
-    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, lag: float
+    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, lags: Sequence[float]
 ) -> Hypothesis:
-    """The hypothesis behind the best actuators so far, those of a group with this delay and lag: the better rest."""
-    several = (
-        trial(_with(best.actuation, group, lag, delay, rest, context.signals))
+    """The hypothesis behind the best actuators so far, those of a group with this delay: the better lag and rest."""
+    several = trial(
+        _with(best.actuation, group, lag, delay, rest, context.signals)
+        for lag in lags
         for rest in (None, *context.rests)
     )
     return max(several, key=by_evidence)

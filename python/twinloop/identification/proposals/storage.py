@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from twinloop._ground.elementary import power
+from twinloop._ground.side_by_side import side_by_side
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import by_evidence
@@ -282,19 +283,21 @@ class Screen:
         columns = [self.problem.values(base)]
         columns += [problem.values(nodes) for (_, problem), nodes in zip(several, behind, strict=True)]
         every, driven = np.concatenate(columns, axis=2), [found.chain for found in sums]
-        grams = [self.problem.gram(chain, every) for chain in driven]
-        found, last = [], len(base)
-        for (one, problem), nodes in zip(several, behind, strict=True):
-            own = [*range(len(base)), *range(last, last + len(nodes))]
-            last += len(nodes)
-            walks = context.walks(
-                self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
-            )
+        threads = context.workers.threads
+        grams = side_by_side(lambda chain: self.problem.gram(chain, every), driven, threads)
+        firsts = itertools.accumulate((len(nodes) for nodes in behind), initial=len(base))
+        units = [self.unit.part(next(self.numbers)) for _ in several]
+
+        def of(asked: tuple[tuple[Hypothesis, Problem], list[int], int, Unit]) -> Hypothesis:
+            (one, problem), nodes, first, unit = asked
+            own = [*range(len(base)), *range(first, first + len(nodes))]
+            walks = context.walks(unit, context.options.moves // 25, purpose="hidden_subsets")
             chosen = search_known(
                 problem, driven, [*base, *nodes], sums, walks, [gram.part(own) for gram in grams]
             )
-            found.append(replace(one, sums=tuple(chosen)))
-        return found
+            return replace(one, sums=tuple(chosen))
+
+        return side_by_side(of, zip(several, behind, firsts, units, strict=False), threads)
 
     def with_all_terms(self, found: Hypothesis) -> Hypothesis:
         """A tried hypothesis with sums of all terms of the first rung, and of those of its hidden states."""

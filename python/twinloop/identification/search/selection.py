@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.context import Context
 from twinloop.identification.description import shorter, shortest
 from twinloop.identification.hypothesis import Hypothesis
@@ -36,12 +37,16 @@ def from_both_sides(
     """
     options, problem = context.options, Problem(context, hypothesis)
     terms, nothing = hypothesis.candidates.ladder[0], [None] * len(hypothesis.driven)
-    below = [first_noise(problem, chain, terms, options.gusts) for chain in hypothesis.driven]
+    # Chains share nothing but the values of their terms.
+    usable, threads = problem.usable(terms), context.workers.threads
+    below = side_by_side(
+        lambda chain: first_noise(problem, chain, usable, options.gusts), hypothesis.driven, threads
+    )
     walks = context.walks(hypothesis.next_unit(context.unit), options.moves, starts=2)
     low = hypothesis.searched(search(problem, below, terms, known or nothing, walks))
     if not options.noise_from_above:
         return replace(low, from_above=low.sums)
-    above = [unexplained(problem, chain, options.gusts) for chain in hypothesis.driven]
+    above = side_by_side(lambda chain: unexplained(problem, chain, options.gusts), hypothesis.driven, threads)
     walks = context.walks(low.next_unit(context.unit), options.moves, starts=2)
     high = low.searched(search(problem, above, terms, nothing, walks))
     both = zip(low.sums, high.sums, strict=True)

@@ -11,6 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log, power
+from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.search.moderation import precisions
 from twinloop.identification.search.noise import RIDGE
 from twinloop.identification.search.problem import Problem
@@ -152,8 +153,13 @@ def search(
     searched = _posed(problem, chains, usable, known, favoured, forbidden)
     unsettled = [(one, problem.regression(one.chain, columns)) for one in searched]
     for round_ in range(NOISE_ROUNDS):
-        for one, regression in unsettled:
-            one.gram = regression.gram(one.chain.sensors, one.chain.motion, problem.workers)
+        grams = side_by_side(
+            lambda pair: pair[1].gram(pair[0].chain.sensors, pair[0].chain.motion, problem.workers),
+            unsettled,
+            problem.workers.threads,
+        )
+        for (one, _), gram in zip(unsettled, grams, strict=True):
+            one.gram = gram
         _choose(problem, usable, [one for one, _ in unsettled], _walk_of(walks, round_, problem))
         if fixed_noise:
             break
