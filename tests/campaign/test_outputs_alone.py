@@ -20,6 +20,7 @@ from twinloop.law.actuation import Actuation, Actuator, HiddenState
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.reports import Computed
 from twinloop.logs import write_columns
+from twinloop.store import StoredAs
 from twinloop.trajectory import completed
 
 DT, NOISE = 0.05, 1e-3
@@ -300,7 +301,7 @@ def test_a_person_is_told_how_the_rate_is_made_and_what_to_record(tmp_path):
         SIGNALS, controller=PID, initial_state=[0.0], target_state=[1.2], duration=1.0, progress=None
     )
     made = "angle_rate is not measured: (angle - angle a period before) / 0.05 s, 0 in the first period"
-    text = sheet("rig.db", campaign.test(GAINS), None, "rig-test-0.csv", campaign.setup)
+    text = sheet(StoredAs("rig.db"), campaign.test(GAINS), None, "rig-test-0.csv", campaign.setup)
     assert f"{made}.\nRecord t, angle, torque, then:" in text
     family = PID.bind(SIGNALS)
     genes = family.genes(GAINS)

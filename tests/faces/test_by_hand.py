@@ -23,6 +23,7 @@ from twinloop.faces.sheet import foretold, sheet
 from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
 from twinloop.planning.leaving import risk_words
+from twinloop.store import StoredAs
 
 PENDULUM = template("rig.db").partition("[options]")[0]
 
@@ -162,7 +163,7 @@ def test_gains_that_no_committee_judged_are_not_called_those_of_a_trusted_contro
     assert "no committee has judged this test" in said["risk_unknown"]
     assert said["why"] in text and ("not vouched" in said["why"] or "without a committee" in said["why"])
     assert "first flight" not in text and "already trust" not in text
-    assert "already trust" in sheet("arm.db", own, None, "rig-test-2.csv", campaign.setup)
+    assert "already trust" in sheet(StoredAs("arm.db"), own, None, "rig-test-2.csv", campaign.setup)
     assert [test.number for test in tl.Campaign.load("arm.db", read_only=True).asked] == [1]
 
 
@@ -205,7 +206,7 @@ def test_rows_after_the_twin_has_diverged_say_so():
     campaign = lives.new("default")
     test = campaign.test(lives.PENDULUM_GAINS)
     predicted = lives.cut(lives.PLANT.run(test), 7, ended="diverged")
-    shown = sheet("rig.db", test, predicted, "rig-test-0.csv", campaign.setup)
+    shown = sheet(StoredAs("rig.db"), test, predicted, "rig-test-0.csv", campaign.setup)
     rows = [line.split() for line in shown.splitlines()]
     rows = {round(float(row[0]) / SIGNALS.dt): row[1:] for row in rows if row and row[0][0].isdigit()}
     assert set(rows) >= {0, 6, 8, 20}
@@ -302,7 +303,9 @@ def test_a_sheet_says_that_another_test_waits_with_its_gains(folder):
     test = campaign.tests[0]
     near = replace(test, number=7, genes=test.genes * (1.0 + 1e-12))
     other = replace(test, number=8, genes=test.genes * 1.001)
-    said = sheet("rig.db", test, None, "rig-test-0.csv", campaign.setup, waiting=(test, near, other))
+    said = sheet(
+        StoredAs("rig.db"), test, None, "rig-test-0.csv", campaign.setup, waiting=(test, near, other)
+    )
     assert "Test 7, which waits too, has these gains with another excitation." in said
     assert said.count("waits too") == 1
 

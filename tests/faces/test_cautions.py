@@ -14,6 +14,7 @@ from twinloop.campaign.assessment import Advice
 from twinloop.faces.cautions import advised_to_stop, leaving
 from twinloop.faces.sheet import facts, sheet
 from twinloop.remarks import serious
+from twinloop.store import StoredAs
 
 SIGNALS = tl.Signals(
     [
@@ -43,7 +44,7 @@ def predicted(low=-0.1, high=0.1, rate=0.0):
 
 def said(campaign, run, against=()):
     test = campaign.test(PENDULUM_GAINS)
-    return sheet("rig.db", test, run, "rig-test-0.csv", campaign.setup, against)
+    return sheet(StoredAs("rig.db"), test, run, "rig-test-0.csv", campaign.setup, against)
 
 
 def test_a_band_that_leaves_the_envelope_is_said(campaign):
@@ -91,7 +92,7 @@ def test_where_the_advice_is_to_stop_a_sheet_says_so_first(campaign):
 
     to_stop = "The advice is to stop: for the controller another flight would bring less than the scatter of"
     assert advised().startswith(to_stop)
-    text = sheet("rig.db", test, None, "rig-test-0.csv", campaign.setup, advice=advised())
+    text = sheet(StoredAs("rig.db"), test, None, "rig-test-0.csv", campaign.setup, advice=advised())
     assert text.splitlines()[1] == advised()
     assert facts(test, Path("rig-test-0.csv"), True, None, (), advised())["advice"] == advised()
     # Before the controller to fly has flown there is a flight to be made.
@@ -106,4 +107,4 @@ def test_a_sheet_says_what_is_scaled_and_what_a_program_does_that_cannot(campaig
     text = said(campaign, None)
     assert "rig-test-0.csv has the rows to be scaled." in text and "hold_back = false under [options]" in text
     quiet = replace(campaign.test(PENDULUM_GAINS), excitation=None, hold_back=None)
-    assert "hold_back" not in sheet("rig.db", quiet, None, "rig-test-0.csv", campaign.setup)
+    assert "hold_back" not in sheet(StoredAs("rig.db"), quiet, None, "rig-test-0.csv", campaign.setup)

@@ -95,6 +95,21 @@ def test_a_card_has_the_ends_of_a_target_that_varies_with_time(tmp_path):
     ]
 
 
+def test_a_card_says_that_a_target_varies_that_ends_where_it_began(tmp_path):
+    path = tmp_path / "arm.db"
+    campaign = stored(path, "default", target_state=lambda t: [0.75 if 0.2 < t < 0.7 else 0.5, 0.0])
+    campaign.test(OTHER_GAINS)
+    campaign.close()
+    with served(path) as address:
+        (card,) = json.loads(call(address, "GET", "/c/1/tests")[2])["tests"]
+        sheet = call(address, "GET", "/c/1/tests/0/sheet")[2]
+        columns = call(address, "GET", "/c/1/tests/0/columns.csv")[2].splitlines()
+    assert [row[2] for row in card["ends"]] == ["target", "0.5", "0"]
+    said = "The target varies with time: arm-test-0.csv has a row of it a period (target_angle)."
+    assert card["varies"] == said and f"\n{said}\n" in sheet
+    assert "target_angle" in columns[0].split(",")
+
+
 def test_what_went_wrong_is_told(store, tmp_path):
     with served(store) as address:
         log = flight(tmp_path / "flight.csv", look(store).tests[1], steps=10)
@@ -145,6 +160,28 @@ def test_what_speaks_against_a_flight_is_said_as_the_commands_say_it(store, tmp_
         printed = invoke(*typed).stderr.replace("copy.db", "hover.db").splitlines()
         assert lines == [line for line in printed if line.startswith("Against this flight: ")]
         assert any(sentence in line for line in lines)
+
+
+def test_of_several_campaigns_a_card_its_sheet_and_its_file_are_those_of_one(store, tmp_path):
+    """The second campaign of the store, flown in part: its sheet is the one that `ask` prints."""
+    second = stored(store, "default", name="my arm", seed=1)
+    first = second.test(OTHER_GAINS)
+    second.tell(first, PLANT.run(first))
+    asked = second.ask()
+    second.close()
+    part = flight(tmp_path / "part.csv", first, steps=15)
+    with served(store) as address:
+        (card,) = json.loads(call(address, "GET", "/c/2/tests")[2])["tests"]
+        sheet = call(address, "GET", "/c/2/tests/1/sheet")[2]
+        _, headers, columns = call(address, "GET", "/c/2/tests/1/columns.csv")
+        printed = invoke("ask", str(store), "--name", "my arm").stdout
+        said = json.loads(call(address, "POST", "/c/2/log?file=part.csv", part)[2])["said"]
+    assert sheet == printed.replace(f"{store.parent}/", "")
+    assert sheet.endswith("  twinloop tell hover.db 1 FLIGHT.csv --name 'my arm'\n")
+    assert said.endswith(f"twinloop withdraw {store} LOG --reason WHY --name 'my arm'")
+    (file,) = store.parent.glob("hover-test-1-of-my-arm-*.csv")
+    assert f"a row a period in {file.name}," in card["excitation"] and asked.excitation is not None
+    assert file.name in headers["content-disposition"] and columns == file.read_text(encoding="utf-8")
 
 
 def test_a_log_that_was_told_is_not_told_twice(store, tmp_path):

@@ -118,7 +118,7 @@ def test_the_first_test_says_before_it_is_approved_what_is_flown_and_what_it_ris
         before = card[: card.index("Approve")]
         assert reason(first, flown=False) in before
         assert "state start target inner range outer range angle (rad) 0 1 " in before
-        assert excitation_words(first, "test-0.csv") in before and "% of a command's range" in before
+        assert excitation_words(first, "first-test-0.csv") in before and "% of a command's range" in before
         assert hold_back_words(first) and hold_back_words(first) in before
         assert f"Risk of leaving the envelope: {unknown_risk(first)}" in before
         kept(page, f"dashboard-first-{size}")

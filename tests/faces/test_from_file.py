@@ -131,6 +131,18 @@ def test_a_system_that_hangs_is_given_up_in_a_sentence_and_nothing_is_lost(folde
     assert [run.number for run in tl.Campaign.load("rig.db", read_only=True).experiments] == [0, 1]
 
 
+def test_a_campaign_that_stopped_is_named_where_its_store_holds_several(folder, monkeypatch):
+    monkeypatch.delitem(sys.modules, "hangs", raising=False)
+    (folder / "hangs.py").write_text(HANGS, encoding="utf-8")
+    written(folder, PENDULUM, section("hangs:hanging"))
+    read_file("rig.toml").campaign(store="rig.db", name="other", threads=1).close()
+    words = ["run", "rig.toml", "--experiments", "2", "--threads", "1", "--timeout", "0.5"]
+    for name, said in (("campaign", "--name campaign"), ("my rig", "--name 'my rig'")):
+        stopped = run(*words, "--name", name)
+        assert f"Continue with: twinloop resume rig.db {said}\n" in stopped.stderr
+        assert run("resume", "rig.db", "--name", name, "--timeout", "0.5").exit_code == 1
+
+
 def test_a_first_flight_that_hangs_leaves_one_sentence(folder, monkeypatch):
     monkeypatch.delitem(sys.modules, "hangs", raising=False)
     (folder / "hangs.py").write_text(HANGS.replace("== 1", "== 0"), encoding="utf-8")

@@ -13,7 +13,7 @@ import twinloop as tl
 from command import invoke
 from conftest import pendulum_step
 from lives import SMALL
-from twinloop.campaign.campaign_file import _toml, template
+from twinloop.campaign.campaign_file import _toml, read_file, template
 from twinloop.logs import write_columns
 
 pytest.importorskip("sqlalchemy")
@@ -116,3 +116,10 @@ def test_a_run_without_faults_says_nothing(folder):
     described('[system]\nuse = "rigs:Radians"')
     done = invoke("run", "rig.toml", "--experiments", "2", "--threads", "1")
     assert done.exit_code == 0 and AGAINST not in done.stderr and "go on" not in done.stderr
+
+
+def test_how_a_flight_is_taken_back_names_its_campaign_where_the_store_holds_several(folder):
+    described('[system]\nuse = "rigs:Degrees"')
+    read_file("rig.toml").campaign(store="rig.db", name="other", threads=1).close()
+    done = invoke("run", "rig.toml", "--experiments", "2", "--threads", "1", "--name", "degrees")
+    assert "To take this one back: twinloop withdraw rig.db 0 --reason WHY --name degrees\n" in done.stderr

@@ -1,5 +1,8 @@
 """Which campaign of a store a person goes on with: the only one, or the named one, and never a second one unasked."""
 
+import csv
+import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -105,3 +108,49 @@ def test_a_first_campaign_has_the_name_that_it_is_given(folder):
     shutil.copy("rig.toml", "other.toml")
     assert invoke("ask", "other.db", "--name", "kite").exit_code == 0
     assert "campaign 'kite'" in invoke("show", "other.db").stdout
+
+
+def added(file):
+    with open(file, encoding="utf-8") as rows:
+        return [float(row["excitation_torque"] or "nan") for row in csv.DictReader(rows)]
+
+
+def test_each_campaign_of_a_store_writes_a_file_of_its_own_beside_it(folder):
+    begun("my wing")
+    sheets = {name: invoke("ask", "rig.db", "--name", name).stdout for name in ("tank", "my wing")}
+    files = [file.name for file in folder.glob("rig-test-*.csv")]
+    assert len(files) == 2 and "rig-test-1-of-tank.csv" in files
+    other = next(file for file in files if "tank" not in file)
+    assert other.startswith("rig-test-1-of-my-wing-")
+    for name, file in (("tank", "rig-test-1-of-tank.csv"), ("my wing", other)):
+        assert f"a row a period in {file}," in sheets[name]
+        test = look(name).tests[1]
+        assert test.excitation is not None and added(file)[:-1] == test.excitation[:, 0].tolist()
+
+
+def test_every_command_that_is_advised_is_one_for_the_named_campaign(folder):
+    """Each is typed as it is printed: it is refused, or of the other campaign, unless it names this one."""
+    begun("my wing")
+    name = ["--name", "my wing"]
+    flight(look("my wing").tests[0], "old.csv")
+
+    def advised(*words):
+        said = "".join([(done := invoke(*words)).stdout, done.stderr])
+        (found,) = re.findall("twinloop [a-z]+ rig.db.*", said)
+        return shlex.split(found.rstrip("."))[1:]
+
+    assert advised("show", "rig.db", *name) == ["learn", "rig.db", *name]
+    assert advised("learn", "rig.db", *name) == ["show", "rig.db", *name]
+    assert invoke(*advised("learn", "rig.db", *name)).exit_code == 0
+    assert advised("tell", "rig.db", "0", "--failed", "motor", *name) == [
+        *("withdraw", "rig.db", "0", "--reason", "WHY"), *name,
+    ]  # fmt: skip
+    taken = advised("withdraw", "rig.db", "0", "--reason", "degrees", *name)
+    assert taken == ["tell", "rig.db", "0", "FLIGHT.csv", *name]
+    assert invoke(*["old.csv" if word == "FLIGHT.csv" else word for word in taken]).exit_code == 0
+    assert [len(look(each).experiments) for each in ("tank", "my wing")] == [1, 1]
+
+
+def test_the_only_campaign_of_a_store_needs_no_name_in_a_command(folder):
+    for words in (["learn", "rig.db"], ["learn", "rig.db", "--name", "tank"]):
+        assert invoke(*words).stdout.endswith(": twinloop show rig.db\n")

@@ -21,8 +21,8 @@ FRONTS = {
     ),
     "autopilots": "declared files sweep",
     "campaign": (
-        "agreement assessment campaign_file certificate cost excited from_logs history keeping presets provenance "
-        "remaining setup"
+        "agreement assessment campaign_file certificate cost excited from_logs history keeping persistence presets "
+        "provenance remaining setup"
     ),
     "campaign/coevolution": "method search",
     "campaign/data": "begun copies declared gains lateness levels odd_one_out readings reports rows sent wrapped",

@@ -18,7 +18,7 @@ from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record
-from twinloop.store import Keeper, Store, Stored, begun, found, listed, only_name, opened
+from twinloop.store import Keeper, Store, Stored, StoredAs, begun, found, listed, only_name, opened
 
 Answer = TypeVar("Answer")
 
@@ -60,6 +60,8 @@ class Keeping:
             assert held is not None  # the keeper has entered it
             check_setup(Setup.from_record(held.setup), setup, as_begun(store.name, name))
             self._keeper.open_session(provenance(threads))
+            # Looked up now: who says after a failure how to go on must not need the store for it.
+            self.stored_as = StoredAs.among(store.name, name, listed(store))
         except BaseException:
             self.close()
             raise

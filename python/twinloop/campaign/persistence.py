@@ -26,7 +26,7 @@ from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput
 from twinloop.law.twin import Twin
 from twinloop.records import Record, Recorded, checked_record
-from twinloop.store import Stored
+from twinloop.store import Stored, StoredAs
 from twinloop.test import Test
 
 if TYPE_CHECKING:
@@ -279,6 +279,15 @@ class Persistent(Recorded):
             self.progress(progress)
         elif self.progress:
             self._own_progress(progress)
+
+
+def stored_as(campaign: Persistent) -> StoredAs | None:
+    """Under what commands find a campaign again, with its name where its store holds several; None: nowhere.
+
+    Args:
+        campaign: that is written now, or is kept nowhere.
+    """
+    return None if campaign._keeping is None else campaign._keeping.stored_as
 
 
 def available_threads() -> int:

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 
 import click
 
+from twinloop.campaign import Campaign
+from twinloop.campaign.persistence import stored_as
 from twinloop.faces.result import to_json
 from twinloop.faces.terminal import is_utf_8
+from twinloop.store import StoredAs
 
 name_option = click.option("--name", help="Name of the campaign, if the store holds several.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -26,3 +29,14 @@ def answer(facts: Mapping[str, object], sentence: str, as_json: bool, err: bool 
         click.echo(to_json(facts, ascii_only=not is_utf_8()), nl=False)
     else:
         click.echo(sentence, err=err)
+
+
+def next_command(campaign: Campaign, verb: str, *words: object) -> str:
+    """A command on a campaign for a person to type next; it names the campaign where its store holds several.
+
+    Args:
+        campaign: that is written now.
+        verb: such as "withdraw".
+        words: arguments behind the store.
+    """
+    return (stored_as(campaign) or StoredAs("STORE")).to_type(verb, *words)

@@ -13,14 +13,16 @@ from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
+from twinloop.campaign.persistence import stored_as
 from twinloop.errors import InvalidInput, NotAvailable, at
-from twinloop.faces.answering import answer, json_option, name_option
+from twinloop.faces.answering import answer, json_option, name_option, next_command
 from twinloop.faces.cautions import advised_to_stop, serious_of
+from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.files import check_writable
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import opened_by_hand
 from twinloop.faces.result import to_json
-from twinloop.faces.sheet import columns, facts, foretold, sheet
+from twinloop.faces.sheet import facts, foretold, sheet
 from twinloop.faces.telling import (
     against_it,
     counted,
@@ -34,7 +36,7 @@ from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
 from twinloop.planning.quality import quality_unit
-from twinloop.store import shown_name
+from twinloop.store import StoredAs, shown_name
 from twinloop.test import Test
 
 
@@ -86,7 +88,7 @@ def ask(
         else:
             known = campaign.waiting_last if last else next(iter(campaign.waiting), None)
             test = campaign.ask(last=last) if again or known is None else known
-        text, described = _shown(store, name, campaign, test)
+        text, described = _shown(campaign, test)
         click.echo(to_json(described) if as_json else text, nl=False)
 
 
@@ -100,30 +102,29 @@ def _ask_batch(
         if not campaign.experiments:
             raise InvalidInput(
                 "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
-                f" {to_type('ask', shown_name(store), *_named(name))}."
+                f" {next_command(campaign, 'ask')}."
             )
-        shown = [_shown(store, name, campaign, test) for test in campaign.ask_batch(batch)]
+        shown = [_shown(campaign, test) for test in campaign.ask_batch(batch)]
         if as_json:
             click.echo(to_json({"tests": [described for _, described in shown]}), nl=False)
             return
         click.echo(
             f"{len(shown)} alternatives, the best first. Fly them in any order and record each with tell;"
-            f" for a test that you will not fly: {to_type('abandon', shown_name(store), 'TEST', *_named(name))}\n"
+            f" for a test that you will not fly: {next_command(campaign, 'abandon', 'TEST')}\n"
         )
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
 
-def _shown(store: str, name: str | None, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
+def _shown(campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     """The sheet of a test, and the same as facts; its file is written."""
-    predicted = foreseen(campaign, test)
-    beside = file_beside(store)
-    stem = Path("campaign") if beside is None else beside.with_suffix("")
-    file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
+    place, predicted = stored_as(campaign), foreseen(campaign, test)
+    assert place is not None  # it was opened in a store
+    file = columns_file(place, test)
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
     advice, chosen = advised_to_stop(campaign), is_chosen(campaign, test)
     text = sheet(
-        shown_name(store),
+        place,
         test,
         predicted,
         str(file),
@@ -131,7 +132,6 @@ def _shown(store: str, name: str | None, campaign: Campaign, test: Test) -> tupl
         against_twin,
         campaign.waiting,
         advice,
-        _named(name),
         chosen,
     )
     return text, facts(test, file, bool(campaign.experiments), predicted, against_twin, advice, chosen)
@@ -229,7 +229,7 @@ def _told(
 
 def _aborted(store: str, name: str | None, test: int, log: Path, why: str) -> str:
     """The command that tells an aborted flight."""
-    return to_type("tell", shown_name(store), test, "--aborted", log, "--reason", why, *_named(name))
+    return StoredAs(shown_name(store), name).to_type("tell", test, "--aborted", log, "--reason", why)
 
 
 @click.command()
@@ -261,11 +261,6 @@ def abandon(store: str, test: int, name: str | None, as_json: bool) -> None:
         campaign.abandon(asked)
         text = f"Saved: test {test} abandoned in {shown_name(store)}."
         answer(_standing(campaign, asked), text, as_json)
-
-
-def _named(name: str | None) -> list[str]:
-    """Words of the next command that name the campaign, where the last one did."""
-    return [] if name is None else ["--name", name]
 
 
 def _say(remarks: Sequence[str]) -> None:

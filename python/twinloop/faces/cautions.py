@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop._experiment.envelope import band_outside
-from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import controller_to_fly
 from twinloop.campaign.history import Lesson
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
+from twinloop.store import StoredAs
 from twinloop.trajectory import Trajectory
 
 
@@ -84,16 +84,15 @@ def serious_of(lesson: Lesson | None) -> list[Remark]:
     return [] if lesson is None else [remark for remark in lesson.remarks if remark.serious]
 
 
-def not_reliable(store: str, remarks: Sequence[Remark]) -> list[str]:
+def not_reliable(stored_as: StoredAs, remarks: Sequence[Remark]) -> list[str]:
     """That the twin is not reliable, with the first reason: a line, or none.
 
     Args:
-        store: of the campaign, as the next command names it.
+        stored_as: under what the next command finds the campaign.
         remarks: serious ones.
     """
     if not remarks:
         return []
     codes = ", ".join(dict.fromkeys(remark.code for remark in remarks))
-    return [
-        f"The twin is not reliable yet ({codes}): {remarks[0].sentence} {to_type('show', store)} has the whole."
-    ]
+    whole = stored_as.to_type("show")
+    return [f"The twin is not reliable yet ({codes}): {remarks[0].sentence} {whole} has the whole."]

@@ -10,14 +10,15 @@ import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.arrays import Floats
-from twinloop._ground.texts import to_type, two_digits
+from twinloop._ground.texts import two_digits
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
+from twinloop.faces.ends import ends, varying, varying_words
 from twinloop.faces.text import quality_words, table
-from twinloop.logs import TIME
 from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
 from twinloop.remarks import Remark
+from twinloop.store import StoredAs
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 from twinloop.unmeasured import in_words
@@ -26,45 +27,14 @@ ROWS = 10
 """Of the predicted run on a sheet, after the first; the file has all."""
 
 
-def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
-    """What is added to each command, targets that vary, and the predicted run with its band, by name.
-
-    Args:
-        test: to be flown.
-        predicted: its run on the twin; None where nothing is known yet.
-    """
-    signals = test.family.signals
-    columns = {TIME: signals.dt * np.arange(test.steps + 1)}
-    if test.excitation is not None:
-        columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
-    columns |= {f"target_{name}": rows for name, rows in _varying(test).items()}
-    if predicted is not None:
-        for i, name in enumerate(signals.state_names):
-            columns[f"predicted_{name}"] = predicted.states[:, i]
-            if predicted.band is not None:
-                columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
-    return columns
-
-
-def _varying(test: Test) -> dict[str, Floats]:
-    """The target of each state whose target varies with time, by name (n + 1,)."""
-    names, target = test.family.signals.state_names, np.atleast_2d(test.target_state)
-    return {name: target[:, i] for i, name in enumerate(names) if (target[:, i] != target[0, i]).any()}
-
-
 def _ends(test: Test, file: str) -> list[str]:
     """Where each state starts and leads; of a target that varies the first and the last row, for the file has all."""
-    signals, target, varying = test.family.signals, np.atleast_2d(test.target_state), _varying(test)
-    leads = ["first target", "last target"] if varying else ["target"]
-    ends = [target[0].tolist(), target[-1].tolist()][: len(leads)]
-    rows = [
-        [state.name, *numbers, state.unit]
-        for state, *numbers in zip(signals.states, test.initial_state.tolist(), *ends, strict=True)
-    ]
+    found = ends(test)
+    leads = ["target"] if len(found[0].targets) == 1 else ["first target", "last target"]
+    rows = [[each.state.name, each.start, *each.targets, each.state.unit] for each in found]
     lines = [table(["state", "start", *leads, "unit"], rows)]
-    if varying:
-        named = ", ".join(f"target_{name}" for name in varying)
-        lines += ["", f"The target varies with time: {file} has a row of it a period ({named})."]
+    if varies := varying_words(test, file):
+        lines += ["", varies]
     return lines
 
 
@@ -231,7 +201,7 @@ def facts(
         "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
         "target_state": {
             **dict(zip(signals.state_names, np.atleast_2d(test.target_state)[-1].tolist(), strict=True)),
-            **{name: rows.tolist() for name, rows in _varying(test).items()},
+            **{name: rows.tolist() for name, rows in varying(test).items()},
         },
         "steps": test.steps,
         "dt": signals.dt,
@@ -285,7 +255,7 @@ def _range(ends: list[float | None]) -> str:
 
 
 def sheet(
-    store: str,
+    stored_as: StoredAs,
     test: Test,
     predicted: Trajectory | None,
     file: str,
@@ -293,13 +263,12 @@ def sheet(
     against: Sequence[Remark] = (),
     waiting: Sequence[Test] = (),
     advice: str = "",
-    named: Sequence[str] = (),
     chosen: bool = False,
 ) -> str:
     """The test sheet, to be printed.
 
     Args:
-        store: of the campaign, as the next command names it.
+        stored_as: under what the next command finds the campaign.
         test: to be flown.
         predicted: its run on the twin; None where nothing is known yet.
         file: where its columns are.
@@ -307,13 +276,12 @@ def sheet(
         against: what speaks against the twin.
         waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
         advice: to stop instead; empty where there is none.
-        named: words of the next command that name the campaign; none where it is the only one of its store.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
     lines = [
-        f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
+        f"TEST {test.number} of {stored_as.store}: {test.steps} periods of {signals.dt:g} s",
         *([advice] if advice else []),
         "",
         table(["set this gain", "to", "unit"], gains),
@@ -339,10 +307,10 @@ def sheet(
     )
     lines.append(f"Risk of {risk_of_what(bounded)}: {risk}")
     lines += band_leaves(signals, predicted)
-    lines += not_reliable(store, against)
+    lines += not_reliable(stored_as, against)
     lines += [reason(test, predicted is not None, chosen), *_alike(test, waiting)]
     lines += [f"{one}." for one in in_words(signals)]
     read = [signals.state_names[i] for i in signals.measured]
     lines.append(f"Record t, {', '.join((*read, *signals.command_names))}, then:")
-    lines.append(f"  {to_type('tell', store, test.number, 'FLIGHT.csv', *named)}")
+    lines.append(f"  {stored_as.to_type('tell', test.number, 'FLIGHT.csv')}")
     return "\n".join(lines) + "\n"

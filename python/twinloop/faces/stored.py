@@ -9,12 +9,11 @@ from typing import Any
 
 import click
 
-from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import behind
 from twinloop.campaign.keeping import heading, look
 from twinloop.errors import InvalidInput, NotAvailable
-from twinloop.faces.answering import name_option
+from twinloop.faces.answering import name_option, next_command
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
 from twinloop.faces.opening import say_if_changed
@@ -25,7 +24,7 @@ from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.withdrawing import named
 from twinloop.faces.working import answers, check_answer, described, knows_nothing, patient, work
-from twinloop.store import Stored, listed, opened, shown_name
+from twinloop.store import Stored, StoredAs, listed, opened
 from twinloop.systems import BUILT_IN, Quadrotor
 
 
@@ -85,7 +84,7 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
         with suppress(NotAvailable):  # there may be no controller to fly yet
             _ = campaign.best_test
         say_if_changed(store, campaign, known)
-        text = f"Learnt from {counted(campaign)}: {to_type('show', shown_name(store))}\n"
+        text = f"Learnt from {counted(campaign)}: {next_command(campaign, 'show')}\n"
         _print({"learnt": len(campaign.experiments)}, text, as_json)
 
 
@@ -102,18 +101,19 @@ def show(store: str, name: str | None, as_json: bool) -> None:
         _print({"campaigns": campaigns}, text, as_json)
         return
     held = look(store, name, read_only=True)
+    stored_as = StoredAs.among(store, held.name, campaigns)
     campaign = Campaign.load(store, held.name, read_only=True)
     facts = _facts(held, campaign)
     campaign.interrupted = True  # what was learnt so far is enough
     known = bool(campaign.experiments) and held.memory is not None and not knows_nothing(campaign)
     result = _result(campaign, held) if known else None
-    text = _sentences(store, facts)
+    text = _sentences(stored_as, facts)
     if result is not None:
         # Looking took no time that anyone asks for.
         shown = {**result, "run_info": {**result["run_info"], "seconds": None}}
         text += f"\n{render(shown, _learnt(campaign, held))}"
         if result["controller"] is not None and result["controller"]["test"] is None:
-            text += f"To fly the tuned gains: {to_type('ask', shown_name(store), '--last')}\n"
+            text += f"To fly the tuned gains: {stored_as.to_type('ask', '--last')}\n"
     say_if_changed(store, campaign, held.name)
     _print({"store": facts, "result": result}, text, as_json)
 
@@ -182,10 +182,10 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
     }
 
 
-def _sentences(store: str, facts: dict[str, Any]) -> str:
+def _sentences(stored_as: StoredAs, facts: dict[str, Any]) -> str:
     of = "" if facts["experiments"] is None else f" of {facts['experiments']}"
     lines = [
-        f"{shown_name(store)}: campaign {facts['name']!r}, begun {facts['created']}.",
+        f"{stored_as.store}: campaign {facts['name']!r}, begun {facts['created']}.",
         f"Preset {facts['preset']}, seed {facts['seed']}.",
         f"Experiments recorded: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]
@@ -193,7 +193,7 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
     if missing:
         lines.append(
             f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}; to learn now:"
-            f" {to_type('learn', shown_name(store))}."
+            f" {stored_as.to_type('learn')}."
         )
     for key, words in (("waiting", "waiting to be flown"), ("failed", "failed"), ("abandoned", "abandoned")):
         if facts[key]:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from twinloop._ground.texts import to_type, whole_characters
+from twinloop._ground.texts import whole_characters
 from twinloop.campaign import Campaign
 from twinloop.campaign.data.copies import copied
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import next_command
 from twinloop.logs import Log, read_log
-from twinloop.store import shown_name
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory, begins_as, check_period, recorded_as
 
@@ -146,7 +146,7 @@ def tell_failed(
     test = numbered(campaign, number)
     status = campaign.status(test)
     if status in ("flown", "aborted"):
-        withdraw = to_type("withdraw", campaign.store or "STORE", number, "--reason", "WHY")
+        withdraw = next_command(campaign, "withdraw", number, "--reason", "WHY")
         raise InvalidInput(
             f"Test {number}: expected one without a recorded flight, found one that was {status}; if that was recorded"
             f" by mistake, withdraw it first: {withdraw}."
@@ -219,7 +219,7 @@ def _told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> li
         exact = begins_as(short, long)
         if exact or copied(run, other.trajectory, campaign.signals):
             of = "an attached flight" if other.number is None else f"a flight of test {other.number}"
-            withdraw = to_type("withdraw", shown_name(campaign.store or "STORE"), "LOG", "--reason", "WHY")
+            withdraw = next_command(campaign, "withdraw", "LOG", "--reason", "WHY")
             how = (
                 "to the last digit"
                 if exact

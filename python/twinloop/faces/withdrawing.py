@@ -9,11 +9,10 @@ from pathlib import Path
 
 import click
 
-from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment, Withdrawal
 from twinloop.errors import InvalidInput
-from twinloop.faces.answering import answer, json_option, name_option
+from twinloop.faces.answering import answer, json_option, name_option, next_command
 from twinloop.faces.telling import counted
 from twinloop.logs import read_log
 from twinloop.store import shown_name
@@ -46,18 +45,19 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
         facts = {
             "test": test, "reason": reason, "abandoned": given_up(campaign), "experiments": len(campaign.experiments),
         }  # fmt: skip
-        shown = shown_name(store)
         which_one = _which(campaign, before) if others else ""
         lines = [
-            f"Saved: {named(campaign.withdrawals[-1])}{which_one} withdrawn; {counted(campaign)} in {shown}.",
+            f"Saved: {named(campaign.withdrawals[-1])}{which_one} withdrawn; {counted(campaign)} in"
+            f" {shown_name(store)}.",
             *given_up_words(campaign),
         ]
         if others or failures:
             left = [*map(_described, others), *(f"its failure: {each.reason}" for each in failures)]
-            again = to_type("withdraw", shown, test, "--reason", "WHY")
+            again = next_command(campaign, "withdraw", test, "--reason", "WHY")
             lines.append(f"Still recorded of test {test}: {', '.join(left)}. To take it back, too: {again}")
         elif test is not None:
-            lines.append(f"Its right log, if there is one: {to_type('tell', shown, test, 'FLIGHT.csv')}")
+            told = next_command(campaign, "tell", test, "FLIGHT.csv")
+            lines.append(f"Its right log, if there is one: {told}")
         answer(facts, "\n".join(lines), as_json)
 
 

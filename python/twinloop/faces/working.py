@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 import click
 
 from twinloop._ground.arrays import number
-from twinloop._ground.texts import to_type
 from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky
+from twinloop.faces.answering import next_command
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable
 from twinloop.faces.result import Result, summary, to_json
@@ -22,7 +22,6 @@ from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.telling import against_it, said_against
 from twinloop.faces.terminal import is_closed, is_utf_8
 from twinloop.faces.text import render
-from twinloop.store import shown_name
 from twinloop.systems import Folder, Quadrotor, System
 from twinloop.test import Test
 
@@ -129,7 +128,7 @@ def work(
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
         if (campaign.interrupted or stopped) and campaign.store is not None:
-            click.echo(f"Saved. Continue with: {to_type('resume', campaign.store)}", err=True)
+            click.echo(f"Saved. Continue with: {next_command(campaign, 'resume')}", err=True)
         if stopped and not campaign.experiments:
             return 1
         if not campaign.experiments or knows_nothing(campaign):
@@ -157,7 +156,7 @@ def _say_against(
     if lines and campaign.runs < experiments:
         back = ""
         if campaign.store is not None:
-            withdraw = to_type("withdraw", shown_name(campaign.store), test.number, "--reason", "WHY")
+            withdraw = next_command(campaign, "withdraw", test.number, "--reason", "WHY")
             back = f" To take this one back: {withdraw}"
         lines.append(
             f"Flights go on after test {test.number}, whatever speaks against it; Ctrl-C stops them.{back}"

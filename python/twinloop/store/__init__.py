@@ -4,6 +4,7 @@ from twinloop.store.address import is_address, shown_name
 from twinloop.store.approvals import approve, approved
 from twinloop.store.database import Store, opened
 from twinloop.store.keeper import Keeper, Stored, begun, found, listed, only_name
+from twinloop.store.stored_as import StoredAs
 from twinloop.store.watching import Doing, doing, state
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "Keeper",
     "Store",
     "Stored",
+    "StoredAs",
     "approve",
     "approved",
     "begun",

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
-import numpy as np
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect, Request
@@ -23,13 +23,14 @@ from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
 from twinloop.faces.cautions import advised_to_stop, serious_of
+from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.dashboard.desk import Desk, unlearnt
 from twinloop.faces.dashboard.fence import App, Fence
+from twinloop.faces.ends import ends, varying_words
 from twinloop.faces.opening import changed_since
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import (
-    columns,
     excitation_words,
     hold_back_ranges,
     hold_back_words,
@@ -136,8 +137,9 @@ class Pages:
     async def columns(self, request: Request) -> Response:
         """What is added to the commands, and the predicted run."""
         name, number = await self._named(request), request.path_params["number"]
-        text = await run_in_threadpool(self._columns, name, number)
-        disposition = f'attachment; filename="test-{number}.csv"'
+        text, file = await run_in_threadpool(self._columns, name, number)
+        # As RFC 6266 has it, for a name that people have given.
+        disposition = f"attachment; filename*=UTF-8''{quote(file, safe='')}"
         return Response(text, media_type="text/csv", headers={"content-disposition": disposition})
 
     async def ask(self, request: Request) -> Response:
@@ -210,6 +212,7 @@ class Pages:
 
     def _waiting(self, name: str) -> dict[str, object]:
         campaign, may = self.desk.look(name), self.desk.approved(name)
+        stored_as = self.desk.stored_as(name)
         units = {gain.name: gain.unit for gain in campaign.family.law_gains}
         bounded = is_bounded(campaign.signals)
         advice = advised_to_stop(campaign) if to_be_flown(campaign) else None
@@ -238,7 +241,8 @@ class Pages:
                     "advice": advice,
                     "reason": reason(test, flown=bool(campaign.history), chosen=is_chosen(campaign, test)),
                     "ends": _ends(test),
-                    "excitation": excitation_words(test, f"test-{test.number}.csv"),
+                    "varies": varying_words(test, columns_file(stored_as, test).name),
+                    "excitation": excitation_words(test, columns_file(stored_as, test).name),
                     "hold_back": hold_back_words(test),
                     "approved": may.get(test.number) if test.number is not None else None,
                 }
@@ -267,40 +271,36 @@ class Pages:
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test) if campaign.history else None
         against = serious_of(latest_lesson(campaign))
-        waiting, file = to_be_flown(campaign), f"test-{number}.csv"
+        waiting, stored_as = to_be_flown(campaign), self.desk.stored_as(name)
+        file = columns_file(stored_as, test).name
         advice, chosen = advised_to_stop(campaign), is_chosen(campaign, test)
         return sheet(
-            self.desk.title, test, predicted, file, campaign.setup, against, waiting, advice, chosen=chosen
+            stored_as, test, predicted, file, campaign.setup, against, waiting, advice, chosen=chosen
         )
 
-    def _columns(self, name: str, number: int) -> str:
+    def _columns(self, name: str, number: int) -> tuple[str, str]:
+        """The text of a test's file, and what the file is called."""
         campaign = self.desk.agreeing(name)
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test) if campaign.history else None
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "columns.csv"
             write_columns(path, columns(test, predicted))
-            return path.read_text("utf-8")
+            return path.read_text("utf-8"), columns_file(self.desk.stored_as(name), test).name
 
 
 def _ends(test: Test) -> list[list[str]]:
     """Where a test starts and should end, and the ranges by which its excitation is held back, as a table."""
     ranges = hold_back_ranges(test)
     head = ["state", "start", "target", *(("inner range", "outer range") if ranges else ())]
-    # Of a target that varies with time its first and its last row.
-    targets = np.atleast_2d(test.target_state)
-    wanted = [
-        " to ".join(dict.fromkeys(f"{value:.4g}" for value in each)) for each in targets[[0, -1]].T.tolist()
-    ]
-    ends = zip(test.family.signals.states, test.initial_state.tolist(), wanted, strict=True)
     rows = [
         [
-            f"{state.name} ({state.unit})" if state.unit not in ("", "1") else state.name,
-            f"{start:.4g}",
-            target,
-            *(ranges.get(state.name, ("any", "any")) if ranges else ()),
+            f"{each.state.name} ({each.state.unit})" if each.state.unit not in ("", "1") else each.state.name,
+            f"{each.start:.4g}",
+            " to ".join(dict.fromkeys(f"{value:.4g}" for value in each.targets)),
+            *(ranges.get(each.state.name, ("any", "any")) if ranges else ()),
         ]
-        for state, start, target in ends
+        for each in ends(test)
     ]
     return [head, *rows]
 

@@ -72,6 +72,8 @@
     const [titles, ...states] = test.ends;
     line(one(".ends thead"), titles, titles.length);
     for (const state of states) line(one(".ends tbody"), state, 1);
+    one(".varies").textContent = test.varies;
+    one(".varies").hidden = !test.varies;
     one(".excitation").textContent = test.excitation;
     one(".held").textContent = test.hold_back;
     one(".held").hidden = !test.hold_back;

@@ -24,7 +24,18 @@ from twinloop.faces.telling import (
 )
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
 from twinloop.logs import Log
-from twinloop.store import Doing, approve, approved, doing, is_address, listed, opened, shown_name, state
+from twinloop.store import (
+    Doing,
+    StoredAs,
+    approve,
+    approved,
+    doing,
+    is_address,
+    listed,
+    opened,
+    shown_name,
+    state,
+)
 from twinloop.test import Test
 
 LOST = 120.0
@@ -62,6 +73,14 @@ class Desk:
         """Name, when begun, tests and experiments of each campaign."""
         with closing(opened(self.store, read_only=True)) as base:
             return listed(base)
+
+    def stored_as(self, name: str) -> StoredAs:
+        """Under what a command finds a campaign, in the folder of the store.
+
+        Args:
+            name: of the campaign.
+        """
+        return StoredAs.among(self.title, name, self.campaigns())
 
     def look(self, name: str) -> Campaign:
         """A campaign to look at, which learns nothing.

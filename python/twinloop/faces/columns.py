@@ -1,0 +1,63 @@
+"""The file of a test: what is added to each command, targets that vary with time, and the predicted run."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+
+from twinloop.faces.ends import varying
+from twinloop.faces.from_file import file_beside
+from twinloop.logs import TIME
+from twinloop.store import StoredAs
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+PLAIN = re.compile("[a-z0-9][a-z0-9_-]{0,59}")
+"""Names that any folder takes as they are, and keeps apart."""
+
+
+def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
+    """What is added to each command, targets that vary, and the predicted run with its band, by name.
+
+    Args:
+        test: to be flown.
+        predicted: its run on the twin; None where nothing is known yet.
+    """
+    signals = test.family.signals
+    columns = {TIME: signals.dt * np.arange(test.steps + 1)}
+    if test.excitation is not None:
+        columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
+    columns |= {f"target_{name}": rows for name, rows in varying(test).items()}
+    if predicted is not None:
+        for i, name in enumerate(signals.state_names):
+            columns[f"predicted_{name}"] = predicted.states[:, i]
+            if predicted.band is not None:
+                columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
+    return columns
+
+
+def columns_file(stored_as: StoredAs, test: Test) -> Path:
+    """The file of a test, beside the store; each campaign of a store has files of its own.
+
+    Args:
+        stored_as: under what the campaign is found.
+        test: of the campaign.
+    """
+    beside = file_beside(stored_as.store)
+    stem = Path("campaign") if beside is None else beside.with_suffix("")
+    of = "" if stored_as.name is None else f"-of-{_in_a_file_name(stored_as.name)}"
+    return stem.with_name(f"{stem.name}-test-{test.number}{of}.csv")
+
+
+def _in_a_file_name(name: str) -> str:
+    """A name of a campaign as a part of that of a file: readable, and another one for any other campaign.
+
+    Where it has letters that a folder may refuse or take for others, a few digits of its hash keep it apart.
+    """
+    if PLAIN.fullmatch(name):
+        return name
+    plain = re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-")
+    return "-".join(filter(None, [plain, hashlib.sha256(name.encode()).hexdigest()[:8]]))

@@ -1,0 +1,44 @@
+"""The file of a test: each campaign of a store has its own, under a name that any folder takes."""
+
+import pytest
+
+from conftest import PENDULUM_GAINS
+from lives import new
+from twinloop.faces.columns import columns_file
+from twinloop.store import StoredAs
+
+NAMES = [
+    "tank", "Tank", "tank 2", "tank_2", "tank-2", "tank.2", "tank/2", "tank\\2", "../tank", "..", ".", "-", " ", "é",
+    "e", "e\u0301", "Ü" * 200, "a" * 200, "a" * 199 + "b", "con:1", 'x"y', "a\nb", "--name", "a\0b", "火星",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def test():
+    campaign = new("default")
+    campaign.test(PENDULUM_GAINS)
+    return campaign.test(PENDULUM_GAINS)
+
+
+def named(name, test):
+    return columns_file(StoredAs("runs/rig.db", name), test)
+
+
+def test_the_file_of_the_only_campaign_of_a_store_stands_beside_it(test):
+    assert columns_file(StoredAs("runs/rig.db"), test).as_posix() == "runs/rig-test-1.csv"
+    assert columns_file(StoredAs("postgresql://host/db"), test).as_posix() == "campaign-test-1.csv"
+    assert named("tank", test).as_posix() == "runs/rig-test-1-of-tank.csv"
+
+
+@pytest.mark.parametrize("name", NAMES, ids=ascii)
+def test_any_name_of_a_campaign_gives_a_file_in_the_folder_of_the_store(test, name):
+    file = named(name, test)
+    assert file.parent.as_posix() == "runs" and len(file.name) < 150
+    kept = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
+    assert set(file.name.removesuffix(".csv")) <= kept
+
+
+def test_no_two_campaigns_have_one_file_in_a_folder_without_upper_case_either(test):
+    files = {named(name, test).name.lower() for name in NAMES}
+    assert len(files) == len(NAMES)
+    assert columns_file(StoredAs("runs/rig.db"), test).name not in files
