@@ -555,7 +555,10 @@ def test_a_first_test_that_failed_or_was_abandoned_gives_way_to_other_gains(fold
     file = folder / "rig.toml"
     before = file.read_text(encoding="utf-8")
     file.write_text(before.replace('"angle.kp" = 2.0', '"angle.kp" = 1.5'), encoding="utf-8")
-    assert "TEST 2" in run("ask", "rig.db").stdout
+    said, known = run("ask", "rig.db").stdout, json.loads(run("ask", "rig.db", "--json").stdout)
+    assert "TEST 2" in said and "before the first flight" not in said
+    assert "this test is your own, and no committee has judged it" in known["risk_unknown"]
+    assert f": {known['risk_unknown']}\n" in said and known["why"] in said
     (*_, test) = look().tests
     assert test.parameters["angle.kp"] == 1.5
     flown(test)

@@ -110,6 +110,28 @@ def test_a_card_says_that_a_target_varies_that_ends_where_it_began(tmp_path):
     assert "target_angle" in columns[0].split(",")
 
 
+@pytest.mark.parametrize("before", ["nothing", "a flight", "a failure"])
+def test_of_the_risk_of_a_test_of_ones_own_it_is_said_why_it_is_unknown(tmp_path, before):
+    path = tmp_path / "arm.db"
+    campaign = stored(path, "default")
+    if before == "a flight":
+        test = campaign.test(PENDULUM_GAINS)
+        campaign.tell(test, PLANT.run(test))
+    elif before == "a failure":
+        campaign.tell_failed(campaign.test(PENDULUM_GAINS), "motor")
+    own = campaign.test(OTHER_GAINS)
+    campaign.close()
+    with served(path) as address:
+        (card,) = json.loads(call(address, "GET", "/c/1/tests")[2])["tests"]
+        sheet = call(address, "GET", f"/c/1/tests/{own.number}/sheet")[2]
+    first = card["risk_unknown"].startswith("not estimated before the first flight. It is the risk of")
+    later = card["risk_unknown"].startswith(
+        "not estimated: this test is your own, and no committee has judged it. It "
+    )
+    assert (first, later) == (before == "nothing", before != "nothing")
+    assert f"Risk of leaving the envelope: {card['risk_unknown']}\n" in sheet
+
+
 def test_what_went_wrong_is_told(store, tmp_path):
     with served(store) as address:
         log = flight(tmp_path / "flight.csv", look(store).tests[1], steps=10)

@@ -31,6 +31,7 @@ from twinloop.faces.telling import (
     said_against,
     tell_failed,
     to_be_flown,
+    was_flown,
 )
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import tell as tell_flight
@@ -122,7 +123,7 @@ def _shown(campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     file = columns_file(place, test)
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
-    advice, chosen = advised_to_stop(campaign), is_chosen(campaign, test)
+    advice, flown, chosen = advised_to_stop(campaign), was_flown(campaign), is_chosen(campaign, test)
     text = sheet(
         place,
         test,
@@ -132,9 +133,10 @@ def _shown(campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
         against_twin,
         campaign.waiting,
         advice,
+        flown,
         chosen,
     )
-    return text, facts(test, file, bool(campaign.experiments), predicted, against_twin, advice, chosen)
+    return text, facts(test, file, flown, predicted, against_twin, advice, chosen)
 
 
 @click.command()

@@ -93,16 +93,19 @@ def foretold(test: Test) -> str:
     return f"{test.predicted:.4g}" + ("" if test.spread is None else f" ± {test.spread:.3g}")
 
 
-def unknown_risk(test: Test, chosen: bool = False) -> str:
+def unknown_risk(test: Test, flown: bool, chosen: bool = False) -> str:
     """What can be said of the risk of a test that no committee has judged: what is added to its controller's commands.
 
     Args:
         test: to be flown.
+        flown: whether anything was flown yet, recorded or failed.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     unknown = (
         "not estimated: no committee has judged this test. Look at its gains before you fly it."
         if chosen
+        else "not estimated: this test is your own, and no committee has judged it."
+        if flown
         else "not estimated before the first flight."
     )
     if test.excitation is None:
@@ -188,7 +191,7 @@ def facts(
     Args:
         test: to be flown.
         file: where its columns are.
-        flown: whether there is any run yet.
+        flown: whether anything was flown yet, recorded or failed.
         predicted: its run on the twin; None where nothing is known yet.
         against: what speaks against the twin.
         advice: to stop instead; empty where there is none.
@@ -210,11 +213,11 @@ def facts(
         "predicted": test.predicted,
         "spread": test.spread,
         "risk": test.risk,
-        "risk_unknown": unknown_risk(test, chosen) if test.risk is None else None,
+        "risk_unknown": unknown_risk(test, flown, chosen) if test.risk is None else None,
         "band_leaves": {name: list(times) for name, times in leaving(signals, predicted).items()},
         "serious": list(dict.fromkeys(remark.code for remark in against)),
         "advice": advice or None,
-        "why": reason(test, flown, chosen),
+        "why": reason(test, predicted is not None, chosen),
         "file": str(file),
     }
 
@@ -263,6 +266,7 @@ def sheet(
     against: Sequence[Remark] = (),
     waiting: Sequence[Test] = (),
     advice: str = "",
+    flown: bool = False,
     chosen: bool = False,
 ) -> str:
     """The test sheet, to be printed.
@@ -276,6 +280,7 @@ def sheet(
         against: what speaks against the twin.
         waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
         advice: to stop instead; empty where there is none.
+        flown: whether anything was flown yet, recorded or failed.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
@@ -301,7 +306,7 @@ def sheet(
         lines += ["", _expected(test, predicted), ""]
     bounded = is_bounded(signals)
     risk = (
-        unknown_risk(test, chosen)
+        unknown_risk(test, flown, chosen)
         if test.risk is None
         else f"{risk_words(test.risk, setup.predicted_flights, bounded)}."
     )
