@@ -29,7 +29,8 @@ class Fence:
     A name that is not the server's own is refused, so that no page elsewhere can reach it under a name that it has made
     point here. Where there is a token, the address at which the request has arrived is the server's own, too: no page
     elsewhere has that. What changes anything has to come from a page of the server's own. Where there is a token, it
-    has to be known: it comes in the address once, and in a cookie from then on.
+    has to be known: it comes in the address once, and in a cookie from then on. All ports of a host share their
+    cookies, so that the cookie's name has the port: another dashboard of the host has a cookie of its own.
 
     Args:
         app: behind it.
@@ -56,7 +57,7 @@ class Fence:
 
         async def guarded(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", ()), *HEADERS, *self._cookie(scope)]
+                message["headers"] = [*message.get("headers", ()), *HEADERS, *self._cookie(scope, headers)]
             await send(message)
 
         await self.app(scope, receive, guarded)
@@ -77,18 +78,30 @@ class Fence:
         return None
 
     def _knows(self, scope: Scope, headers: Mapping[str, str]) -> bool:
-        given = (*_kept(headers.get("cookie", "")), *_asked(scope))
+        given = (*_kept(headers.get("cookie", ""), _cookie_of(headers)), *_asked(scope))
         return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in given)
 
-    def _cookie(self, scope: Scope) -> list[tuple[bytes, bytes]]:
+    def _cookie(self, scope: Scope, headers: Mapping[str, str]) -> list[tuple[bytes, bytes]]:
         if not self.token or self.token not in _asked(scope):
             return []
-        return [(b"set-cookie", f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/".encode())]
+        cookie = f"{_cookie_of(headers)}={self.token}"
+        return [(b"set-cookie", f"{cookie}; HttpOnly; SameSite=Strict; Path=/".encode())]
+
+
+def _name_and_port(host: str) -> tuple[str, str]:
+    """Both parts of a host as a browser writes it; no port where it is the usual one."""
+    name, _, port = host.lower().rpartition(":")
+    return (name, port) if name and port.isdecimal() else (host.lower(), "")
 
 
 def _name(host: str) -> str:
-    name, _, port = host.lower().rpartition(":")
-    return name if name and port.isdecimal() else host.lower()
+    return _name_and_port(host)[0]
+
+
+def _cookie_of(headers: Mapping[str, str]) -> str:
+    """Name of the cookie; the port is that of the browser's address, which behind a tunnel is not the server's own."""
+    port = _name_and_port(headers.get("host", ""))[1]
+    return f"{COOKIE}_{port}" if port else COOKIE
 
 
 def _arrived(scope: Scope) -> str | None:
@@ -108,13 +121,13 @@ def _is_of(origin: str | None, host: str) -> bool:
         return False
 
 
-def _kept(cookies: str) -> list[str]:
+def _kept(cookies: str, wanted: str) -> list[str]:
     """Tokens among the cookies of a request.
 
     All ports of a host share their cookies, so others stand beside, in any form: those are passed over, not read.
     """
     pairs = (each.partition("=") for each in cookies.split(";"))
-    return [value.strip() for name, _, value in pairs if name.strip() == COOKIE]
+    return [value.strip() for name, _, value in pairs if name.strip() == wanted]
 
 
 def _asked(scope: Scope) -> list[str]:
