@@ -8,7 +8,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
-from lives import FULL_LIFE, PLANT, SIGNALS, begun, by_hand, cut, lived, made, outcome
+from lives import FULL_LIFE, PLANT, SIGNALS, begun, by_hand, cut, lived, made, outcome, plain
 from lives import new as begin
 from oracles import same_bits
 from twinloop.campaign.examination import log_check
@@ -110,6 +110,42 @@ def test_logs_alone_are_enough_to_ask_and_to_name_a_controller():
     result = json.loads(to_json(summary(campaign, {"name": "pendulum"}, {})))
     assert result["experiments"][0]["test"] is None and result["first_controller"]["test"] == 0
     assert "steps, attached." in render(result)
+
+
+def in_noise(test, seed, digits=None):
+    """A flight of a test with noisy sensors, saved with some digits."""
+    run = tl.systems.Simulated(SIGNALS, pendulum_step, noise=[2e-3, 1e-2], seed=seed).run(test)
+    if digits is None:
+        return run
+    return tl.Trajectory(run.t, np.round(run.states, digits), np.round(run.commands, digits))
+
+
+@pytest.mark.parametrize("digits", [None, 4])
+def test_a_copy_of_a_recorded_flight_is_not_attached_in_whatever_digits(digits):
+    campaign = made(duration=2.0)
+    first = campaign.test(GAINS)
+    campaign.tell(first, in_noise(first, 0))
+    campaign.attach(
+        in_noise(first, 1), "tue.csv"
+    )  # the same controller from the same start, but another flight
+    before = plain(campaign)
+    for seed, name in ((0, "test 0"), (1, "tue.csv")):
+        found = rf"Campaign\.attach: expected a new flight, found a copy of .* already, {name}: .* nothing was changed"
+        with pytest.raises(tl.InvalidInput, match=found):
+            campaign.attach(in_noise(first, seed, digits), "wed.csv")
+    assert plain(campaign) == before
+    # The same noise again under a second test, as of a simulator that begins anew, is told as it was.
+    campaign.tell(first, in_noise(first, 0))
+    campaign.withdraw(campaign.experiments[1], "another machine")
+    campaign.attach(in_noise(first, 1, digits))
+    assert [run.number for run in campaign.experiments] == [0, 0, None]
+
+
+def test_an_exact_simulator_may_fly_the_same_twice():
+    campaign = begun()
+    for _ in range(2):
+        campaign.attach(campaign.experiments[0].trajectory)
+    assert len(campaign.experiments) == 3
 
 
 def test_a_useless_record_is_not_attached_and_the_paper_attaches_none(new_campaign):

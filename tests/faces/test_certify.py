@@ -300,7 +300,8 @@ def test_a_log_that_is_whole_turns_on_widens_no_flown_range():
     before, looked = campaign.certificate().uses[0], campaign.examine()
     first = campaign.experiments[0].trajectory
     on = np.array([4.0 * np.pi, 0.0])
-    campaign.attach(tl.Trajectory(first.t, first.states + on, first.commands))
+    # A part of the flight: all of it would be a copy, which is refused.
+    campaign.attach(tl.Trajectory(first.t[:-1], first.states[:-1] + on, first.commands[:-1]))
     campaign.interrupted = True  # what was learnt is enough
     after, found = campaign.certificate().uses[0], campaign.examine()
     assert after.flown == pytest.approx(before.flown, abs=1e-9) and after.name == "angle"

@@ -19,7 +19,7 @@ from twinloop.campaign.assessment import Advice, advice, controller_to_fly, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.cost import Cost, cost
-from twinloop.campaign.entering import attached_run, flown_test
+from twinloop.campaign.entering import attached_run, flown_test, refuse_copy
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
@@ -268,7 +268,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             log: what remarks and reports shall call it, such as the name of its file; empty: by its number.
 
         Raises:
-            InvalidInput: a useless trajectory; nothing has changed.
+            InvalidInput: a useless trajectory, or a copy of a flight that is recorded already, as the noise of its
+                readings shows; nothing has changed.
             NotAvailable: the preset "paper" learns from tests of its controllers only.
         """
         if isinstance(self._method, Coevolution):
@@ -277,7 +278,9 @@ class Campaign(Shown, Persistent, kind="campaign"):
                 ' controllers only; choose preset="default".'
             )
         with self._entering():
-            self._book.enter(attached_run(self.setup, trajectory, self._error_so_far, log))
+            run = attached_run(self.setup, trajectory, self._error_so_far, log)
+            refuse_copy(trajectory, self._book.experiments, self.signals)
+            self._book.enter(run)
         self.interrupted = False
         self._warn_of_last(None)
 

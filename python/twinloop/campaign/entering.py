@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from twinloop import _core
 from twinloop._experiment.replay import Replay
 from twinloop._ground.texts import in_unit, one_line, text
 from twinloop.campaign.data.begun import not_ready
-from twinloop.campaign.history import Experiment
+from twinloop.campaign.data.copies import copy_of, saved_again
+from twinloop.campaign.history import Experiment, called
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
 from twinloop.law.accuracy import squares
 from twinloop.objectives import frozen_error
+from twinloop.signals import Signals
 from twinloop.test import Test, final_distance
 from twinloop.trajectory import Trajectory, check_recorded, completed, continued
 
@@ -66,6 +68,25 @@ def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge, log: str = 
     replayed = Replay(setup.signals, recorded.states[0], recorded.commands)
     run = Experiment(replayed, recorded, None, _frozen(recorded, setup), None, None, attached=True, log=name)
     return dataclasses.replace(run, before=judge(run))
+
+
+def refuse_copy(trajectory: Trajectory, experiments: Sequence[Experiment], signals: Signals) -> None:
+    """Refuses to attach what is recorded already: learnt twice, one flight would be the evidence of two.
+
+    Args:
+        trajectory: to be attached.
+        experiments: of the campaign.
+        signals: of the system.
+
+    Raises:
+        InvalidInput: it is a flight of these, perhaps saved with fewer digits.
+    """
+    for run, name in zip(experiments, called(experiments), strict=True):
+        if saved_again(trajectory, run.trajectory, signals):
+            raise InvalidInput(
+                f"Campaign.attach: expected a new flight, found {copy_of(name)}; nothing was changed. Attach another"
+                " one."
+            )
 
 
 def renewed_run(run: Experiment, setup: Setup) -> Experiment:

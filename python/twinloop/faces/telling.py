@@ -9,9 +9,10 @@ import numpy as np
 
 from twinloop._ground.texts import whole_characters
 from twinloop.campaign import Campaign
-from twinloop.campaign.data.copies import copied
+from twinloop.campaign.data.copies import copied, copy_of, saved_again
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.history import called as names_of
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import next_command
 from twinloop.logs import Log, read_log
@@ -249,20 +250,15 @@ def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | 
     test. Of other tests it is only said: with nearly the same gains a simulator whose noise begins again flies nearly
     the same.
     """
-    for told in campaign.experiments:
+    for told, name in zip(campaign.experiments, names_of(campaign.experiments), strict=True):
         if recorded_as(run, told.trajectory, campaign.signals):
             if test is not None and _again(told.test, test):
                 continue
             how = "one that is recorded already, equal to the last digit"
-        elif (
-            run.steps == told.trajectory.steps
-            and (test is None or (told.test is not None and told.test.number == test.number))
-            and copied(run, told.trajectory, campaign.signals)
+        elif (test is None or (told.test is not None and told.test.number == test.number)) and saved_again(
+            run, told.trajectory, campaign.signals
         ):
-            how = (
-                "a copy of one that is recorded already: their readings differ by far less than their noise, which no"
-                " two flights share"
-            )
+            how = copy_of(name)
         else:
             continue
         raise InvalidInput(

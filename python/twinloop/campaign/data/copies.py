@@ -55,6 +55,29 @@ def copied(one: Trajectory, other: Trajectory, signals: Signals) -> bool:
     return noisy
 
 
+def saved_again(run: Trajectory, told: Trajectory, signals: Signals) -> bool:
+    """Whether a run is all of another one, saved again.
+
+    Args:
+        run: it may lack what is not measured.
+        told: run that is recorded.
+        signals: of the system.
+    """
+    return run.steps == told.steps and copied(run, told, signals)
+
+
+def copy_of(name: str) -> str:
+    """What was found, for an error.
+
+    Args:
+        name: what the flight is called that is recorded already.
+    """
+    return (
+        f"a copy of one that is recorded already, {name}: their readings differ by far less than their noise, which"
+        " no two flights share"
+    )
+
+
 def _size(differences: Floats) -> Floats:
     """Root mean square of each column of (n, m): (m,)."""
     size: Floats = np.sqrt(np.square(differences).mean(axis=0))
