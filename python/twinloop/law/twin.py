@@ -185,7 +185,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
 
         Modules of Python, C and FMUs are run on the commands of the flights that the twin was learnt from and compared
         with the twin; SymPy is evaluated at their states. Differences above 1e-9 of a state's scale are refused (1e-3
-        in single precision).
+        in single precision). Unless forced, the serious remarks on the twin are said as `RemarkWarning`s.
 
         Args:
             to: a kind, or the path of a file with the suffix of one.
@@ -202,6 +202,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
             NotTrusted: the twin does not follow its own flights.
             NotAvailable: the export could not be checked on them.
         """
+        if not force:
+            warn(self.remarks, stacklevel=2)
         return taken_twin(self, to, kind, precision, force, episode)
 
     @cached_property

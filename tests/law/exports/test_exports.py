@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import types
+import warnings
 
 import numpy as np
 import pytest
@@ -643,6 +644,26 @@ def test_what_speaks_against_a_twin_goes_with_its_file_and_keeps_it_there(tmp_pa
     # An earlier version wrote none.
     record = {key: value for key, value in told.to_record().items() if key != "remarks"}
     assert tl.Twin.from_record({**record, "version": 7}).remarks == ()
+
+
+def test_what_speaks_against_a_twin_is_a_warning_where_it_is_taken_away_in_python(tmp_path):
+    twin = TWINS["acceleration"]()
+    said = (
+        Remark("free-run", "serious", "It misses its flights."),
+        Remark("form", "note", "The form was searched."),
+    )
+    told = tl.Twin(twin.model, twin.signals, twin.errors, flights=twin.flights, remarks=said)
+    for to in ("latex", tmp_path / "twin.json"):
+        with pytest.warns(tl.RemarkWarning) as warned:
+            told.export(to)
+        assert [str(each.message) for each in warned] == ["It misses its flights. (free-run)"]
+        assert warned[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = tl.load_twin(tmp_path / "twin.json")
+        assert again.export("latex", force=True) == twin.export("latex")  # forced, or nothing to be said
+    with pytest.warns(tl.RemarkWarning, match="It misses"):
+        again.export("python")
 
 
 def test_a_stored_campaign_is_taken_away_from_the_command_line(tmp_path, new_campaign, pendulum):
