@@ -19,7 +19,7 @@ import twinloop as tl
 from command import hearing_ctrl_c, invoke
 from conftest import PENDULUM_GAINS
 from dashboards import begun, call, flight, look, served
-from lives import OTHER_GAINS, PLANT, stored
+from lives import OTHER_GAINS, PLANT, by_hand, stored
 
 pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
 pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
@@ -110,13 +110,15 @@ def test_a_card_says_that_a_target_varies_that_ends_where_it_began(tmp_path):
     assert "target_angle" in columns[0].split(",")
 
 
-@pytest.mark.parametrize("before", ["nothing", "a flight", "a failure"])
+@pytest.mark.parametrize("before", ["nothing", "a log", "a flight", "a failure"])
 def test_of_the_risk_of_a_test_of_ones_own_it_is_said_why_it_is_unknown(tmp_path, before):
     path = tmp_path / "arm.db"
     campaign = stored(path, "default")
     if before == "a flight":
         test = campaign.test(PENDULUM_GAINS)
         campaign.tell(test, PLANT.run(test))
+    elif before == "a log":
+        campaign.attach(by_hand(30))
     elif before == "a failure":
         campaign.tell_failed(campaign.test(PENDULUM_GAINS), "motor")
     own = campaign.test(OTHER_GAINS)
@@ -128,7 +130,7 @@ def test_of_the_risk_of_a_test_of_ones_own_it_is_said_why_it_is_unknown(tmp_path
     later = card["risk_unknown"].startswith(
         "not estimated: this test is your own, and no committee has judged it. It "
     )
-    assert (first, later) == (before == "nothing", before != "nothing")
+    assert (first, later) == ((True, False) if before in ("nothing", "a log") else (False, True))
     assert f"Risk of leaving the envelope: {card['risk_unknown']}\n" in sheet
 
 

@@ -31,7 +31,6 @@ from twinloop.faces.telling import (
     said_against,
     tell_failed,
     to_be_flown,
-    was_flown,
 )
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import tell as tell_flight
@@ -123,7 +122,7 @@ def _shown(campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     file = columns_file(place, test)
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
-    advice, flown, chosen = advised_to_stop(campaign), was_flown(campaign), is_chosen(campaign, test)
+    advice, flown, chosen = advised_to_stop(campaign), campaign.runs > 0, is_chosen(campaign, test)
     text = sheet(
         place,
         test,

@@ -98,7 +98,7 @@ def unknown_risk(test: Test, flown: bool, chosen: bool = False) -> str:
 
     Args:
         test: to be flown.
-        flown: whether anything was flown yet, recorded or failed.
+        flown: whether any test was flown yet, recorded or failed; attached flights are of none.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     unknown = (
@@ -191,7 +191,7 @@ def facts(
     Args:
         test: to be flown.
         file: where its columns are.
-        flown: whether anything was flown yet, recorded or failed.
+        flown: whether any test was flown yet, recorded or failed; attached flights are of none.
         predicted: its run on the twin; None where nothing is known yet.
         against: what speaks against the twin.
         advice: to stop instead; empty where there is none.
@@ -280,7 +280,7 @@ def sheet(
         against: what speaks against the twin.
         waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
         advice: to stop instead; empty where there is none.
-        flown: whether anything was flown yet, recorded or failed.
+        flown: whether any test was flown yet, recorded or failed; attached flights are of none.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}

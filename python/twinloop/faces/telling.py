@@ -176,15 +176,6 @@ def to_be_flown(campaign: Campaign) -> list[Test]:
     return [test for test in campaign.tests if campaign.status(test) == "asked"]
 
 
-def was_flown(campaign: Campaign) -> bool:
-    """Whether anything was flown, with a record or not.
-
-    Args:
-        campaign: of it.
-    """
-    return bool(campaign.experiments or campaign.failures)
-
-
 def is_chosen(campaign: Campaign, test: Test) -> bool:
     """Whether the campaign chose a test, by `ask`; otherwise it is a person's own.
 

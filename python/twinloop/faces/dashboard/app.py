@@ -38,7 +38,7 @@ from twinloop.faces.sheet import (
     sheet,
     unknown_risk,
 )
-from twinloop.faces.telling import is_chosen, numbered, to_be_flown, was_flown
+from twinloop.faces.telling import is_chosen, numbered, to_be_flown
 from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
 from twinloop.planning.leaving import risk_of_what, risk_words
@@ -235,7 +235,7 @@ class Pages:
                     if test.risk is None
                     else risk_words(test.risk, campaign.setup.predicted_flights, bounded),
                     "risk_of": risk_of_what(bounded),
-                    "risk_unknown": unknown_risk(test, was_flown(campaign), is_chosen(campaign, test))
+                    "risk_unknown": unknown_risk(test, campaign.runs > 0, is_chosen(campaign, test))
                     if test.risk is None
                     else None,
                     "advice": advice,
@@ -273,7 +273,7 @@ class Pages:
         against = serious_of(latest_lesson(campaign))
         waiting, stored_as = to_be_flown(campaign), self.desk.stored_as(name)
         file = columns_file(stored_as, test).name
-        advice, flown, chosen = advised_to_stop(campaign), was_flown(campaign), is_chosen(campaign, test)
+        advice, flown, chosen = advised_to_stop(campaign), campaign.runs > 0, is_chosen(campaign, test)
         return sheet(
             stored_as, test, predicted, file, campaign.setup, against, waiting, advice, flown, chosen
         )
