@@ -238,6 +238,16 @@ def test_a_first_controller_that_failed_is_not_flown_again():
     assert campaign.experiments[0].test.number == other.number
 
 
+def test_a_first_test_whose_failure_had_another_cause_is_withdrawn_as_the_refusal_says_and_flown():
+    campaign = made()
+    campaign.tell_failed(campaign.test(GAINS), "the plug was out")
+    with pytest.raises(tl.NotAvailable, match=r"campaign\.withdraw\(number, why\)"):
+        campaign.run(PLANT, 2)
+    campaign.withdraw(0, "the plug was out")
+    campaign.run(PLANT, 2)
+    assert campaign.experiments[0].test.number == 0
+
+
 # Tests that are not flown
 
 

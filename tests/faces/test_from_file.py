@@ -152,6 +152,90 @@ def test_a_first_flight_that_hangs_leaves_one_sentence(folder, monkeypatch):
     assert "did not answer test 0 within 0.3 s" in stopped.stderr and "Interrupted" not in stopped.stderr
 
 
+RAISES = """
+import rig
+
+def broken():
+    system = rig.rig()
+    plain = system.run
+    def run(test):
+        if test.number == {number}:
+            open("/dev/no-such-port")
+        return plain(test)
+    system.run = run
+    return system
+"""
+
+
+def test_a_rig_whose_code_raises_is_answered_with_the_line_that_did(folder, monkeypatch):
+    monkeypatch.delitem(sys.modules, "raises", raising=False)
+    (folder / "raises.py").write_text(RAISES.format(number=1), encoding="utf-8")
+    written(folder, PENDULUM, section("raises:broken", "timeout = 60.0"))
+    stopped = run("run", "rig.toml", "--experiments", "2", "--threads", "1")
+    assert stopped.exit_code == 1 and "1 experiment" in stopped.stdout
+    said = "expected a run, found FileNotFoundError in raises.py, line 9: [Errno 2] No such file or directory"
+    assert said in stopped.stderr and "Continue with: twinloop resume rig.db" in stopped.stderr
+    monkeypatch.delitem(sys.modules, "raises", raising=False)
+    (folder / "raises.py").write_text(RAISES.format(number=99), encoding="utf-8")
+    done = run("resume", "rig.db", "--threads", "1")
+    assert done.exit_code == 0, done.output
+    assert [flight.number for flight in tl.Campaign.load("rig.db", read_only=True).experiments] == [0, 1]
+
+
+def test_a_rig_whose_code_raises_in_its_first_flight_leaves_a_sentence_and_no_traceback(folder, monkeypatch):
+    monkeypatch.delitem(sys.modules, "raises", raising=False)
+    (folder / "raises.py").write_text(RAISES.format(number=0), encoding="utf-8")
+    written(folder, PENDULUM, section("raises:broken"))
+    stopped = run("run", "rig.toml")
+    assert stopped.exit_code == 1 and stopped.stdout == "" and isinstance(stopped.exception, SystemExit)
+    assert "found FileNotFoundError in raises.py, line 9" in stopped.stderr
+
+
+FAILS = """
+import twinloop as tl
+from pathlib import Path
+import rig
+
+def failing():
+    system = rig.rig()
+    plain = system.run
+    def run(test):
+        if not Path("plugged").exists():
+            raise tl.SystemFailure("no motor")
+        return plain(test)
+    system.run = run
+    return system
+"""
+
+
+@pytest.mark.parametrize("way", ["other gains", "withdrawn", "abandoned"])
+def test_after_a_first_flight_that_failed_a_campaign_can_go_on_from_the_shell(folder, monkeypatch, way):
+    monkeypatch.delitem(sys.modules, "fails", raising=False)
+    (folder / "fails.py").write_text(FAILS, encoding="utf-8")
+    written(folder, PENDULUM, section("fails:failing"))
+    words = ["run", "rig.toml", "--experiments", "2", "--threads", "1"]
+    failed = run(*words)
+    assert failed.exit_code == 1 and "no motor" in failed.stderr
+    again = run(*words)
+    assert again.exit_code == 2 and "found those of test 0 (no motor)" in again.stderr
+    assert "twinloop withdraw rig.db 0 --reason WHY" in again.stderr
+    (folder / "plugged").touch()
+    first = 0
+    if way == "other gains":
+        written(folder, PENDULUM.replace('"angle.kp" = 2.0', '"angle.kp" = 1.5'), section("fails:failing"))
+        first = 1
+    else:
+        assert run("withdraw", "rig.db", "0", "--reason", "no motor").exit_code == 0
+    if way == "abandoned":
+        assert run("abandon", "rig.db", "0").exit_code == 0
+        first = 1
+    done = run(*words)
+    assert done.exit_code == 0, done.output
+    flown = tl.Campaign.load("rig.db", read_only=True).experiments
+    assert flown[0].number == first
+    assert flown[0].test.parameters["angle.kp"] == (1.5 if way == "other gains" else 2.0)
+
+
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan"])
 def test_a_timeout_is_seconds_above_nothing(folder, seconds):
     refused = run("run", "quadrotor", "--timeout", seconds)
@@ -189,6 +273,11 @@ def test_a_system_that_asks_for_signals_is_given_those_of_the_file(folder):
         ((PENDULUM, section("quadroto")), "did you mean 'quadrotor'"),
         ((PENDULUM, section("rig:rigg")), "has no attribute"),
         ((PENDULUM, section("rigg:rig")), "No module named"),
+        ((PENDULUM, section("unread:rig")), "SyntaxError: invalid syntax (unread.py, line 2); correct it"),
+        (
+            (PENDULUM, section("unmade:Rig", noise=0.1)),
+            "found OSError in unmade.py, line 3: no port; correct it",
+        ),
         ((PENDULUM, section("rig:number")), "expected a system, or a class"),
         ((PENDULUM, section("rig:there", noise=0.1)), "name a class or a function"),
         ((PENDULUM, section("rig:rig", nois=0.1)), "did you mean 'noise'"),
@@ -201,7 +290,11 @@ def test_a_system_that_asks_for_signals_is_given_those_of_the_file(folder):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_file_with_a_mistake_is_refused_with_what_to_do(folder, parts, word):
+def test_a_file_with_a_mistake_is_refused_with_what_to_do(folder, monkeypatch, parts, word):
+    (folder / "unread.py").write_text("x = 1\ndef (\n", encoding="utf-8")
+    unmade = "class Rig:\n    def __init__(self, signals, noise):\n        raise OSError('no port')\n"
+    (folder / "unmade.py").write_text(unmade, encoding="utf-8")
+    monkeypatch.delitem(sys.modules, "unmade", raising=False)
     written(folder, *parts)
     done = run("run", "rig.toml")
     assert done.exit_code == 2 and word in done.stderr, done.output

@@ -64,7 +64,7 @@ FRONTS = {
     "reproduce": "command",
     "store": "uninterrupted",
     "sweep": "command progress seeds workers",
-    "systems": "base named patience quadrotor stepped",
+    "systems": "base named patience quadrotor raised stepped",
 }
 
 

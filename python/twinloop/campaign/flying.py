@@ -144,7 +144,8 @@ def _next(campaign: Campaign, system: System, last: bool) -> Test:
     if campaign.failures:
         raise NotAvailable(
             "Campaign.run: expected a first test that has not failed, found none; make one with"
-            " campaign.test(gains), from another controller that you trust."
+            " campaign.test(gains), from another controller that you trust, or withdraw the failure if the gains were"
+            " not its cause: campaign.withdraw(number, why)."
         )
     gains = getattr(system, "default_gains", None)
     if gains is None:

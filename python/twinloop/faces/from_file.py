@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from twinloop._ground.texts import to_type
+from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import CampaignFile, read_file
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import Watch
@@ -54,10 +56,31 @@ def run_file(
     campaign = file.campaign(store=store, name=name, threads=threads)
     watch = Watch(campaign.options, experiments, file.flies.use)
     campaign.progress = watch
-    if not campaign.tests:
-        campaign.test(file.first)
+    try:
+        _first(campaign, file)
+    except InvalidInput:
+        campaign.close()
+        raise
     seconds = file.flies.timeout if timeout is None else timeout
     return work(campaign, rig, watch, experiments, output, plot, as_json, file.flies.use, seconds, max_risk)
+
+
+def _first(campaign: Campaign, file: CampaignFile) -> None:
+    """Makes the first test of a file's gains: before there is any test, and where none that was made is to be flown."""
+    gone = all(campaign.status(test) in ("failed", "abandoned") for test in campaign.tests)
+    if campaign.tests and (campaign.experiments or not gone):
+        return
+    first = campaign.family.genes(dict(file.first))
+    for failure in campaign.failures:
+        if failure.test.genes.tobytes() == first.tobytes():
+            assert campaign.store is not None  # a campaign file has one
+            back = to_type("withdraw", campaign.store, failure.test.number, "--reason", "WHY")
+            raise InvalidInput(
+                f"Campaign file {file.path}, [first]: expected gains that have not failed, found those of test"
+                f" {failure.test.number} ({failure.reason}); write those of another controller that you trust, or, if"
+                f" the gains were not the cause, withdraw the failure: {back}."
+            )
+    campaign.test(first)
 
 
 def file_beside(store: str) -> Path | None:

@@ -13,7 +13,7 @@ from twinloop._ground.arrays import number
 from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.campaign.history import Experiment
-from twinloop.errors import InvalidInput, NoAnswer, TooRisky
+from twinloop.errors import InvalidInput, NoAnswer, TooRisky, TwinloopError
 from twinloop.faces.answering import next_command
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable
@@ -23,6 +23,8 @@ from twinloop.faces.telling import against_it, said_against
 from twinloop.faces.terminal import is_closed, is_utf_8
 from twinloop.faces.text import render
 from twinloop.systems import Folder, Quadrotor, System
+from twinloop.systems.patience import raised_in_a_run
+from twinloop.systems.raised import raised
 from twinloop.test import Test
 
 Answer = TypeVar("Answer")
@@ -111,7 +113,7 @@ def work(
 
     Returns:
         The exit code: 130 after an interruption, 1 where no controller is fit to fly, a test was too risky, or the
-        system did not answer in time.
+        system did not answer in time, or raised.
 
     Raises:
         KeyboardInterrupt: an interruption before there was a result.
@@ -125,6 +127,11 @@ def work(
                 campaign.run(rig, experiments, timeout=timeout, max_risk=max_risk)
             except (TooRisky, NoAnswer) as reason:
                 click.echo(f"twinloop: {reason}", err=True)
+                stopped = True
+            except Exception as reason:
+                if isinstance(reason, TwinloopError) or not raised_in_a_run(reason):
+                    raise
+                click.echo(f"twinloop: {_raised_by(name, reason, campaign.store is not None)}", err=True)
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
         if (campaign.interrupted or stopped) and campaign.store is not None:
@@ -146,6 +153,12 @@ def work(
         _uninterrupted(lambda: campaign.plot(plot))
         click.echo(f"Picture: {plot}", err=True)
     return 130 if campaign.interrupted else 1 if stopped or result["controller"] is None else 0
+
+
+def _raised_by(name: str, reason: Exception, kept: bool) -> str:
+    """That the code of a system raised, and what becomes of the test that it was to fly."""
+    waits = "The test still waits and nothing is lost: correct that, then go on." if kept else "Correct that."
+    return f"System {name!r}: expected a run, found {raised(reason)}. {waits}"
 
 
 def _say_against(

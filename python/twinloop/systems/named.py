@@ -17,6 +17,7 @@ from twinloop.systems.fmu import FMU
 from twinloop.systems.folder import Folder
 from twinloop.systems.gymnasium import Gymnasium
 from twinloop.systems.quadrotor import Quadrotor
+from twinloop.systems.raised import raised
 from twinloop.systems.rotorpy import RotorPy
 
 NAMED: Mapping[str, Any] = {
@@ -74,7 +75,7 @@ def imported(name: str, place: str) -> Any:
         place: where the module should be, for the error.
 
     Raises:
-        InvalidInput: there is none.
+        InvalidInput: there is none, or the module's code raises.
     """
     module, _, attribute = name.partition(":")
     try:
@@ -85,6 +86,12 @@ def imported(name: str, place: str) -> Any:
         raise InvalidInput(
             f"System {name!r}: expected module:object, found: {reason}; check the spelling, and that the module"
             f" {place}."
+        ) from reason
+    except TwinloopError:
+        raise
+    except Exception as reason:
+        raise InvalidInput(
+            f"System {name!r}: expected a module that can be imported, found {raised(reason)}; correct it."
         ) from reason
     return found
 
@@ -129,7 +136,8 @@ def _made(name: str, found: Any, arguments: dict[str, Any], signals: Signals | N
         raise
     except Exception as reason:
         raise InvalidInput(
-            f"System {name!r}: expected to be made of {arguments}, found {type(reason).__name__}: {reason}; correct it."
+            f"System {name!r}: expected to be made of its arguments ({', '.join(arguments) or 'none'}), found"
+            f" {raised(reason)}; correct it."
         ) from reason
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
+from traceback import walk_tb
 
 from twinloop._ground.arrays import number
 from twinloop.errors import NoAnswer
@@ -77,6 +78,15 @@ def run_within(system: System, test: Test, seconds: float | None, landed: list[T
         raise late from next(iter(failure), None)
     if failure:
         raise failure[0]
+
+
+def raised_in_a_run(reason: BaseException) -> bool:
+    """Whether it was the system's own `run` that raised, or something it called.
+
+    Args:
+        reason: that came out of `run_within`.
+    """
+    return any(frame.f_code is _run.__code__ for frame, _ in walk_tb(reason.__traceback__))
 
 
 def _run(system: System, test: Test, landed: list[Trajectory]) -> None:
