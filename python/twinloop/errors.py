@@ -125,6 +125,16 @@ def in_file(reason: InvalidInput, lines: Sequence[int] | None) -> str:
     return f"{before} {row_name(row, lines)}{after}"
 
 
+def comma_separated(names: Iterable[str]) -> str:
+    """Names behind commas, in quotes where a name holds commas itself, as those of a sweep's campaigns do.
+
+    Args:
+        names: in their order.
+    """
+    every = list(names)
+    return ", ".join(map(repr, every) if any("," in name for name in every) else every)
+
+
 def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
     """The error for a name that is not on a list.
 
@@ -139,6 +149,8 @@ def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
     names = [str(name) for name in known]
     near = difflib.get_close_matches(str(found), names, n=1)
     advice = (
-        f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names) or '(there are none)'}."
+        f"did you mean {near[0]!r}?"
+        if near
+        else f"expected one of {comma_separated(names) or '(there are none)'}."
     )
     return InvalidInput(f"Unknown {kind} {str(found)!r}: {advice}")

@@ -201,6 +201,11 @@ def test_what_cannot_be_used_is_refused_in_one_sentence(case):
     assert isinstance(refusal.value, ValueError)
 
 
+def test_a_family_that_is_bound_already_is_called_that_and_not_written_out(new_campaign):
+    with pytest.raises(tl.InvalidInput, match="found Family; pass one that is bound to no signals"):
+        new_campaign(controller=new_campaign().family)
+
+
 CAMPAIGNS = {
     "no signals": {"signals": None},
     "a controller that is none": {"controller": "PID"},

@@ -91,6 +91,14 @@ def test_of_several_campaigns_one_has_to_be_named(folder):
     assert names() == ["tank", "wing"]
 
 
+def test_names_with_commas_are_told_apart_where_one_has_to_be_chosen(folder):
+    begun("rotor, seed 0")
+    begun("rotor, seed 1")
+    for refused in (invoke("learn", "rig.db"), invoke("learn", "rig.db", "--name", "zzz")):
+        assert refused.exit_code == 2
+        assert "'tank', 'rotor, seed 0', 'rotor, seed 1'." in refused.stderr
+
+
 def test_what_is_named_is_written_and_the_sheet_names_it_in_the_next_command(folder):
     begun("wing")
     asked = invoke("ask", "rig.db", "--name", "wing")

@@ -260,8 +260,8 @@ def _described(flights: Flights) -> tuple[Signals, UnboundFamily]:
         )
     if not isinstance(flights.controller, UnboundFamily):
         raise InvalidInput(
-            "Campaign, controller: expected a family such as twinloop.controllers.PID, "
-            f"found {flights.controller!r}; pass one."
+            "Campaign, controller: expected a family such as twinloop.controllers.PID, found"
+            f" {type(flights.controller).__name__}; pass one that is bound to no signals."
         )
     return flights.signals, flights.controller
 

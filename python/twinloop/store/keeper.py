@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from twinloop.errors import InvalidInput, StoreFailure
+from twinloop.errors import InvalidInput, StoreFailure, comma_separated
 from twinloop.records import Record, from_text, to_text
 from twinloop.store.columns import count_in, moment_in, provenance_in, record_in
 from twinloop.store.database import Store
@@ -163,8 +163,8 @@ def only_name(store: Store, names: Sequence[str]) -> str:
     """
     if len(names) > 1:
         raise InvalidInput(
-            f"Store {store.name}: expected the name of one of its campaigns, found none; it holds {', '.join(names)}."
-            " Choose one with --name, in Python with name=."
+            f"Store {store.name}: expected the name of one of its campaigns, found none; it holds"
+            f" {comma_separated(names)}. Choose one with --name, in Python with name=."
         )
     return names[0] if names else ""
 
