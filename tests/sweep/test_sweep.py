@@ -67,6 +67,26 @@ def test_a_job_is_the_campaign_that_one_would_make_by_hand(here):
     assert plain(mine) == plain(campaign)
 
 
+def test_a_campaign_of_a_built_in_system_knows_it_and_goes_on_with_the_same_bits(here, tmp_path):
+    path, outcomes = here
+    job = outcomes[0].job
+    shutil.copy(path, tmp_path / "own.db")
+    store = str(tmp_path / "own.db")
+    shown = json.loads(invoke("show", store, "--name", job.name, "--json").stdout)
+    assert shown["result"]["system"]["name"] == "quadrotor" and shown["result"]["system"]["noise"] == 1e-3
+    gone_on = invoke("resume", store, "--name", job.name, "--experiments", "3")
+    assert gone_on.exit_code == 0, gone_on.output
+    rig = tl.systems.Quadrotor(noise=1e-3, seed=0)
+    mine = tl.Campaign(
+        rig.signals, controller=rig.controller, initial_state=rig.initial_state, target_state=rig.target_state,
+        duration=rig.duration, preset="paper", seed=0, options=job.values(),
+    ).run(rig, 2).run(rig, 3)  # fmt: skip
+    theirs = tl.Campaign.load(store, job.name, read_only=True)
+    assert len(theirs.experiments) == 3
+    for one, other in zip(mine.experiments, theirs.experiments, strict=True):
+        assert one.trajectory.states.tobytes() == other.trajectory.states.tobytes()
+
+
 def test_what_is_kept_is_not_flown_again(here, monkeypatch):
     path, outcomes = here
     monkeypatch.setattr("twinloop.sweep.campaigns.fly", lambda *_, **__: pytest.fail("flown again"))

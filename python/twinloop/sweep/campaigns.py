@@ -12,7 +12,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import check_setup
 from twinloop.errors import InvalidInput
 from twinloop.store import listed, opened, shown_name
-from twinloop.sweep.flying import Flown, begun, fly, reason
+from twinloop.sweep.flying import Flown, begun, fly, landed, reason
 from twinloop.sweep.jobs import Job, system_of
 from twinloop.sweep.workers import HERE, finished, threads_on
 
@@ -75,7 +75,7 @@ def sweep(jobs: Sequence[Job], store: str | Path, cluster: str | Client = HERE) 
         elif flown.record is None:
             yield Outcome(job, None, flown.failure, flown.seconds)
         else:
-            campaign = Campaign.from_record(flown.record, threads=1, progress=None)
+            campaign = landed(job, flown.record, flown.runs)
             campaign.save(store, job.name)
             yield Outcome(job, campaign, None, flown.seconds)
 

@@ -11,6 +11,7 @@ from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.errors import RemarkWarning, TwinloopError
 from twinloop.records import Record
 from twinloop.sweep.jobs import Job, system_of
+from twinloop.systems import BUILT_IN
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,13 @@ class Flown:
         record: of the campaign; None if it failed.
         failure: why it did; None if it did not.
         seconds: that it took.
+        runs: of the system when it was over, which the noise of its next run depends on; None where it counts none.
     """
 
     record: Record | None
     failure: str | None
     seconds: float
+    runs: int | None = None
 
 
 def fly(job: Job, threads: int | None = None) -> Flown:
@@ -43,11 +46,28 @@ def fly(job: Job, threads: int | None = None) -> Flown:
         warnings.simplefilter("ignore", RemarkWarning)
         try:
             campaign = begun(job, system_of(job.system, job.seed), threads)
-            campaign.run(system_of(job.system, job.seed), job.experiments)
+            system = system_of(job.system, job.seed)
+            campaign.run(system, job.experiments)
             controller_to_fly(campaign)
         except Exception as failure:  # a system by others may raise anything: the other campaigns go on
             return Flown(None, reason(failure), time.monotonic() - clock)
-    return Flown(campaign.to_record(), None, time.monotonic() - clock)
+    return Flown(campaign.to_record(), None, time.monotonic() - clock, getattr(system, "runs", None))
+
+
+def landed(job: Job, record: Record, runs: int | None) -> Campaign:
+    """The campaign that a worker flew. One of a built-in system knows it, as if it had been flown here.
+
+    Args:
+        job: that was done.
+        record: of the campaign.
+        runs: of the system when it was over.
+    """
+    campaign = Campaign.from_record(record, threads=1, progress=None)
+    if job.system.partition(":")[0] in BUILT_IN:
+        system = system_of(job.system, job.seed)
+        system.runs = runs
+        campaign.run(system, job.experiments)  # all of them are flown: it takes the system up, and no more
+    return campaign
 
 
 def reason(failure: BaseException) -> str:
