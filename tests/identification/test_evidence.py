@@ -127,6 +127,20 @@ def test_a_tuned_hidden_state_that_commands_alone_fill_pays_for_standing_in():
         assert tuned - searched == pytest.approx(paid)
 
 
+def test_such_a_state_pays_for_each_reading_and_one_that_motion_fills_does_not():
+    # What a law that is not quite right leaves on every reading grows with them, and so does a part of it.
+    for hidden, each in ((CLIMB, 0.02), ((TWIST,), 0.0), (PUSHED, 0.0), ((), 0.0)):
+        actuation = Actuation(AT_ONCE.actuators, hidden)
+        few, many = (
+            price("acceleration", actuation, APART, STATES, tuned=True, readings=readings)
+            for readings in (1000, 5000)
+        )
+        assert many - few == pytest.approx(each * 4000)
+        assert price("acceleration", actuation, APART, STATES, readings=5000) == price(
+            "acceleration", actuation, APART, STATES
+        )
+
+
 def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_once():
     assert price("acceleration", BOTH_LATE, APART, STATES) == 2 * LAGGING
     assert price("acceleration", BOTH_LATE, TOGETHER, STATES) == LAGGING

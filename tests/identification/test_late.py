@@ -1,6 +1,6 @@
 """Sensors of driven states that are late by whole periods: found, believed only where they pay, and simulated."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.late import late, unread
 from twinloop.identification.records import Run
 from twinloop.identification.remarks import late_sensors
+from twinloop.identification.searches import Reading
 from twinloop.identification.sensors.chains import Chain
 from twinloop.law.reports import Held, given, in_words, late_in, old, reports_of, with_late
 
@@ -138,13 +139,39 @@ def test_what_short_looks_see_no_more_is_learnt_and_readings_in_time_are_held_ag
 def test_readings_that_are_older_than_their_runs_count_as_readings_that_others_foretell():
     runs = logged((0, 3))
     context = replace(context_of(runs), reports=(None, Held(1, 1, 3)))
-    chains = [Chain((0,), 0, "acceleration", np.array([0.04]), np.array([0.04])),
-              Chain((1,), 1, "acceleration", np.array([0.5]), np.array([0.5]))]  # fmt: skip
+    chains = chains_of()
     assert unread(context, chains) == pytest.approx(2 * 3 * (1.0 + np.log(2.0 * 0.5)))
     # Of white noise they are what a reading that stands alone has, −2 log of its likelihood but for log 2π.
     errors = np.sqrt(2.0 * 0.5) * np.random.default_rng(0).normal(size=200_000)
     alone = -2.0 * norm.logpdf(errors, scale=1.0).mean() - np.log(2.0 * np.pi)
     assert unread(context, chains) / 6 == pytest.approx(alone, rel=0.02)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """As much of a hypothesis as is asked what its late sensors pay."""
+
+    readings: int
+    observer: tuple[Chain, ...] = ()
+
+    @property
+    def fit(self):
+        return self
+
+
+@pytest.mark.parametrize(("ages", "distinct"), [((0, 0), 0), ((0, 3), 1), ((2, 2), 1), ((1, 3), 2)])
+def test_what_is_late_pays_for_itself_and_for_each_reading(ages, distinct):
+    context = replace(context_of(logged(ages)), reports=with_late((), ages))
+    paid = [Reading(context, ()).paid(Fitted(readings, chains_of())) for readings in (0, 600, 3000)]
+    assert paid[0] == pytest.approx(12.0 * distinct + unread(context, chains_of()))
+    assert np.diff(paid) == pytest.approx([12.0 * distinct, 48.0 * distinct])
+
+
+def chains_of():
+    return (
+        Chain((0,), 0, "acceleration", np.array([0.04]), np.array([0.04])),
+        Chain((1,), 1, "acceleration", np.array([0.5]), np.array([0.5])),
+    )
 
 
 def test_a_law_that_is_only_tuned_again_keeps_what_is_late():

@@ -123,10 +123,17 @@ class Hypothesis(Recorded, kind="hypothesis"):
     @property
     def evidence(self) -> Evidence:
         """What the readings say for it."""
-        paid = price(self.form, self.actuation, self.alike, len(self.offsets), tuned=self.fit is not None)
-        if self.fit is not None:
-            length = self.fit.length + paid
-            return Evidence(fitted=True, stable=self.fit.stable, smoothed=False, length=length)
+        fit = self.fit
+        paid = price(
+            self.form,
+            self.actuation,
+            self.alike,
+            len(self.offsets),
+            tuned=fit is not None,
+            readings=0 if fit is None else fit.readings,
+        )
+        if fit is not None:
+            return Evidence(fitted=True, stable=fit.stable, smoothed=False, length=fit.length + paid)
         correlated = CORRELATED * sum(found.chain.motion.correlated > 0.0 for found in self.sums)
         return Evidence(
             fitted=False, stable=True, smoothed=self.smoothed, length=self.length + correlated + paid

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import ANEW, LATENESS, by_evidence
+from twinloop.identification.evidence import ANEW, LATENESS, SLIGHT, by_evidence
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.late import unread
 from twinloop.identification.proposals.apart import apart
@@ -86,7 +86,8 @@ class Reading:
         """What late sensors pay under a hypothesis, and what readings would have that are older than their runs."""
         ages = late_in(self.context.reports, self.context.signals.n_x)
         observer = one.driven if one.fit is None else one.fit.observer
-        return LATENESS * len(set(ages) - {0}) + unread(self.context, observer)
+        each = LATENESS + SLIGHT * (0 if one.fit is None else one.fit.readings)
+        return each * len(set(ages) - {0}) + unread(self.context, observer)
 
 
 def likelier(several: Sequence[Reading]) -> Reading:
