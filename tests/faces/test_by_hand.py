@@ -482,6 +482,17 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     )
 
 
+def test_a_flight_may_be_told_as_aborted_without_a_reason(folder):
+    run("ask", "rig.db")
+    flown(look().tests[0])
+    lines = Path("flight.csv").read_text(encoding="utf-8").splitlines()
+    Path("short.csv").write_text("\n".join(lines[:12]), encoding="utf-8")
+    told = run("tell", "rig.db", "0", "--aborted", "short.csv")
+    assert told.exit_code == 0 and told.stdout.startswith("Saved: test 0 aborted")
+    flight = look().experiments[0].trajectory
+    assert (flight.ended, flight.reason, flight.steps) == ("aborted", "stopped early", 10)
+
+
 def test_a_range_of_numbers_is_named_only_where_there_are_several_tests():
     campaign = lives.new("default")
     with pytest.raises(tl.InvalidInput, match="expected one that was made, found 0; ask for one first"):
@@ -499,10 +510,7 @@ def test_a_range_of_numbers_is_named_only_where_there_are_several_tests():
     [
         (("tell", "rig.db", "0"), "--failed REASON"),
         (("tell", "rig.db", "0", "--failed", "a", "--aborted", "x.csv"), "found both"),
-        (
-            ("tell", "rig.db", "0", "--aborted", "x.csv"),
-            "write: twinloop tell rig.db 0 --aborted x.csv --reason why.",
-        ),
+        (("tell", "rig.db", "0", "--aborted", "x.csv"), "check its name"),
         (("tell", "rig.db", "0", "--aborted", "x.csv", "--reason", "a gust"), "check its name"),
         (("tell", "rig.db", "0", "--aborted", "x.csv", "--reason", " "), "a few words"),
         (("tell", "rig.db", "0", "x.csv", "--reason", "a gust"), "beside --aborted FLIGHT"),

@@ -39,6 +39,9 @@ from twinloop.planning.quality import quality_unit
 from twinloop.store import StoredAs, shown_name
 from twinloop.test import Test
 
+STOPPED = "stopped early"
+"""Why a test was aborted, where nobody says it."""
+
 
 @click.command()
 @click.argument("file", type=Path)
@@ -146,7 +149,9 @@ def _shown(campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     "--failed", metavar="REASON", help="Why the test failed; FLIGHT is its partial log, if there is one."
 )
 @click.option("--aborted", type=Path, metavar="FLIGHT", help="Log of a test that was stopped before its end.")
-@click.option("--reason", metavar="REASON", help="Required with --aborted: why it was stopped.")
+@click.option(
+    "--reason", metavar="REASON", help=f"Why it was stopped, beside --aborted; without it: {STOPPED}."
+)
 @name_option
 @json_option
 def tell(
@@ -170,7 +175,7 @@ def tell(
                 campaign,
                 test,
                 log,
-                aborted=reason or "",
+                aborted="" if aborted is None else STOPPED if reason is None else reason,
                 otherwise=f"record a test that was stopped early: {_aborted(store, name, test, log, 'why')}",
             )
         text = (
@@ -211,19 +216,13 @@ def _told(
             "tell: expected --reason with a few words beside --aborted FLIGHT, found it without one of the two; a test"
             " that failed says why itself: --failed REASON."
         )
-    if aborted is not None and reason is None:
-        raise InvalidInput(
-            "tell: expected why the flight was stopped, found no --reason; write:"
-            f" {_aborted(store, name, test, aborted, 'why')}."
-        )
     if failed is not None and not failed.strip():
         raise InvalidInput(
             'tell: expected what happened behind --failed, found nothing; such as "motor cut out".'
         )
     if failed is None and flight is None and aborted is None:
         raise InvalidInput(
-            "tell: expected a flight, found none; name its file, or say --aborted FLIGHT --reason REASON, or --failed"
-            " REASON."
+            "tell: expected a flight, found none; name its file, or say --aborted FLIGHT, or --failed REASON."
         )
     return flight if aborted is None else aborted
 
