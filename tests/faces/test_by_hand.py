@@ -574,6 +574,16 @@ def test_a_first_test_that_failed_or_was_abandoned_gives_way_to_other_gains(fold
     assert "TEST 3" in run("ask", "rig.db").stdout and look().trusted.number == 2
 
 
+def test_a_first_test_that_failed_for_another_cause_than_its_gains_is_flown_after_the_advised_command(folder):
+    run("ask", "rig.db")
+    run("tell", "rig.db", "0", "--failed", "no power")
+    refused = run("ask", "rig.db")
+    written = "twinloop withdraw rig.db 0 --reason"
+    assert refused.exit_code == 2 and f"withdraw the failure: {written} WHY." in refused.stderr
+    assert run(*shlex.split(f"{written} 'no power'")[1:]).exit_code == 0
+    assert "TEST 0" in run("ask", "rig.db").stdout
+
+
 def test_another_duration_is_named_as_the_file_does(folder):
     run("ask", "rig.db")
     file = folder / "rig.toml"

@@ -14,11 +14,12 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.persistence import stored_as
-from twinloop.errors import InvalidInput, NotAvailable, at
+from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.answering import answer, json_option, name_option, next_command
 from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.files import check_writable
+from twinloop.faces.first_test import first_test
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import opened_by_hand
 from twinloop.faces.result import to_json
@@ -293,12 +294,4 @@ def _first(store: str, campaign: Campaign) -> Test:
         raise NotAvailable(
             f"ask: expected the gains of the first test in {where}, found no such file; add it."
         )
-    with at(f"Campaign file {file}, [first]"):
-        first = campaign.family.genes(dict(read_file(file).first))
-        for failure in campaign.failures:
-            if failure.test.genes.tobytes() == first.tobytes():
-                raise InvalidInput(
-                    f"expected gains that have not failed, found those of test {failure.test.number}"
-                    f" ({failure.reason}); write those of another controller that you trust."
-                )
-        return campaign.test(first)
+    return first_test(campaign, read_file(file))

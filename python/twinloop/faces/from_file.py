@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import CampaignFile, read_file
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import Watch
+from twinloop.faces.first_test import first_test
 from twinloop.faces.working import check_answer, work
 from twinloop.store import is_address
 
@@ -70,17 +70,7 @@ def _first(campaign: Campaign, file: CampaignFile) -> None:
     gone = all(campaign.status(test) in ("failed", "abandoned") for test in campaign.tests)
     if campaign.tests and (campaign.experiments or not gone):
         return
-    first = campaign.family.genes(dict(file.first))
-    for failure in campaign.failures:
-        if failure.test.genes.tobytes() == first.tobytes():
-            assert campaign.store is not None  # a campaign file has one
-            back = to_type("withdraw", campaign.store, failure.test.number, "--reason", "WHY")
-            raise InvalidInput(
-                f"Campaign file {file.path}, [first]: expected gains that have not failed, found those of test"
-                f" {failure.test.number} ({failure.reason}); write those of another controller that you trust, or, if"
-                f" the gains were not the cause, withdraw the failure: {back}."
-            )
-    campaign.test(first)
+    first_test(campaign, file)
 
 
 def file_beside(store: str) -> Path | None:
