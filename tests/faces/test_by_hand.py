@@ -584,6 +584,21 @@ def test_a_first_test_that_failed_for_another_cause_than_its_gains_is_flown_afte
     assert "TEST 0" in run("ask", "rig.db").stdout
 
 
+@pytest.mark.parametrize("attached", [False, True])
+def test_before_the_first_flight_there_is_no_other_test_and_the_reason_is_said(folder, attached):
+    assert "TEST 0" in run("ask", "rig.db", "--again").stdout, "nothing waits yet"
+    if attached:
+        flown(look().tests[0], "old.csv")
+        assert run("attach", "rig.db", "old.csv").exit_code == 0
+    refused = run("ask", "rig.db", "--again")
+    assert refused.exit_code == 2 and refused.stdout == "" and refused.stderr.count("\n") == 1
+    assert "--again: expected the flight of a test" in refused.stderr
+    assert "fly test 0, which twinloop ask rig.db shows" in refused.stderr
+    assert "twinloop abandon rig.db 0." in refused.stderr and len(look().tests) == 1
+    assert run("abandon", "rig.db", "0").exit_code == 0
+    assert "TEST 1" in run("ask", "rig.db", "--again").stdout
+
+
 def test_another_duration_is_named_as_the_file_does(folder):
     run("ask", "rig.db")
     file = folder / "rig.toml"

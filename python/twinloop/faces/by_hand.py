@@ -88,12 +88,24 @@ def ask(
     with closing(opened_by_hand(store, name, threads)) as campaign:
         # Whatever was attached: the first test is the controller that is trusted.
         if all(run.attached for run in campaign.experiments):
-            test = next(iter(to_be_flown(campaign)), None) or _first(store, campaign)
+            waiting = next(iter(to_be_flown(campaign)), None)
+            if again and waiting is not None:
+                raise InvalidInput(_not_again(campaign, waiting))
+            test = waiting or _first(store, campaign)
         else:
             known = campaign.waiting_last if last else next(iter(campaign.waiting), None)
             test = campaign.ask(last=last) if again or known is None else known
         text, described = _shown(campaign, test)
         click.echo(to_json(described) if as_json else text, nl=False)
+
+
+def _not_again(campaign: Campaign, waiting: Test) -> str:
+    """Why there is no other test while the first one waits."""
+    return (
+        "twinloop ask --again: expected the flight of a test, from which another test is planned, found none; fly test"
+        f" {waiting.number}, which {next_command(campaign, 'ask')} shows, or give it up to write other gains into"
+        f" [first]: {next_command(campaign, 'abandon', waiting.number)}."
+    )
 
 
 def _ask_batch(
