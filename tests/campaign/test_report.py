@@ -185,7 +185,7 @@ def test_a_twin_of_a_system_that_never_answered_follows_nothing_and_gives_no_adv
     failed = {check.name for check in campaign.checks() if not check.passed}
     assert {"follows", "remarks"} <= failed
     twin, _, following = verdict(campaign)
-    assert "not reliable yet. Commands moved and nothing answered" in twin and "stop" not in following
+    assert "do not trust it. Commands moved and nothing answered" in twin and "stop" not in following
 
 
 def test_the_errors_of_the_report_are_those_of_whole_flights():
@@ -209,7 +209,8 @@ def test_a_printed_campaign_is_the_report_and_begins_with_a_verdict(preset):
     first = campaign.test(GAINS)
     campaign.tell(first, PLANT.run(first))
     twin, controller, following = verdict(campaign)
-    assert "normalised error" in twin and "measured" in controller and following
+    assert "do not trust it" in twin and "measured" in controller and following
+    assert twin.endswith(" All checks: print(campaign.checks())")
     assert "d rate / dt" in str(campaign) or preset == "paper"
     assert repr(campaign) == f"Campaign(preset={preset!r}, seed=0, experiments=1)"
 
@@ -222,7 +223,7 @@ def test_the_verdict_says_that_a_twin_is_not_to_be_believed_and_that_there_is_no
         wrong = 0.5 * stream.normal(size=run.commands.shape)
         campaign.tell(test, tl.Trajectory(run.t, run.states, wrong, ended="diverged", reason="ran away"))
     twin, controller, following = verdict(campaign)
-    assert "not reliable yet" in twin and "none to fly" in controller and "another controller" in following
+    assert "do not trust it" in twin and "none to fly" in controller and "another controller" in following
 
 
 def test_a_campaign_draws_itself(tmp_path):

@@ -18,6 +18,7 @@ from conftest import TINY, pendulum_step
 from lives import SIGNALS, SMALL
 from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, read_signals, template
+from twinloop.campaign.examination import checking
 from twinloop.faces.cli import main
 from twinloop.faces.sheet import foretold, sheet
 from twinloop.faces.telling import numbered
@@ -242,7 +243,7 @@ def test_a_flight_that_was_outside_the_envelope_most_of_the_time_is_noticed_at_o
     assert (sentence in told.stderr) == ("outside its envelope" in told.stderr) == said
 
 
-def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder):
+def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder, monkeypatch):
     run("ask", "rig.db")
     early = run("learn", "rig.db")
     assert early.exit_code == 2 and "at least one recorded experiment" in early.stderr
@@ -257,7 +258,12 @@ def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_s
     flown(look().tests[0])
     assert len(look().tests) == 1  # nothing was asked for
     # Gains that no test was made of are called by no number.
-    assert "Controller: tuned gains, not asked for yet, " in shown.stdout
+    assert "Controller: do not fly it; tuned gains, not asked for yet, " in shown.stdout
+    assert "To fly the tuned gains" not in shown.stdout
+    # Eight predicted flights cannot show a risk below 6 %: where that is no reason against them, they may be flown.
+    monkeypatch.setattr(checking, "RISK", 0.1)
+    shown = run("show", "rig.db")
+    assert "Controller: not on this twin's prediction; tuned gains, not asked for yet, " in shown.stdout
     assert shown.stdout.endswith("To fly the tuned gains: twinloop ask rig.db --last\n")
     assert json.loads(run("show", "rig.db", "--json").stdout)["result"]["controller"]["test"] is None
     # What was learnt so is what the next question learns.

@@ -11,6 +11,7 @@ import twinloop as tl
 from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS
 from lives import SMALL
 from twinloop.campaign.assessment import Advice
+from twinloop.campaign.examination.check import Check, Checks
 from twinloop.faces.cautions import advised_to_stop, leaving
 from twinloop.faces.sheet import facts, sheet
 from twinloop.remarks import serious
@@ -84,10 +85,17 @@ def test_where_the_advice_is_to_stop_a_sheet_says_so_first(campaign):
     test = campaign.test(PENDULUM_GAINS)
     advice = Advice(1, True, 1e-5, 1e-3, 1e-3, True)
 
-    def advised(measured=0.4, **changes):
+    fails = Check("delay", "controller", 0.6, 1.0, False, True, "It bears 0.6 periods more.")
+
+    def advised(measured=0.4, checks=(), **changes):
         best = replace(test.quiet(), measured=measured)
         return advised_to_stop(
-            SimpleNamespace(history=[0], advice=replace(advice, **changes), best_test=best)
+            SimpleNamespace(
+                history=[0],
+                advice=replace(advice, **changes),
+                best_test=best,
+                checks=lambda: Checks(checks),
+            )
         )
 
     to_stop = "The advice is to stop: for the controller another flight would bring less than the scatter of"
@@ -97,6 +105,8 @@ def test_where_the_advice_is_to_stop_a_sheet_says_so_first(campaign):
     assert facts(test, Path("rig-test-0.csv"), True, None, (), advised())["advice"] == advised()
     # Before the controller to fly has flown there is a flight to be made.
     assert advised(measured=None) == advised(stop=False) == advised(stop=None) == ""
+    # Nor is it the advice where the verdict is that a check fails.
+    assert advised(checks=[fails]) == ""
     assert facts(test, Path("rig-test-0.csv"), True, None, ())["advice"] is None
     assert "advice" not in said(campaign, None)
     for nothing in (SimpleNamespace(history=[]), SimpleNamespace(history=[0], advice=None)):

@@ -25,6 +25,7 @@ pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
 pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
 
 from twinloop.campaign.assessment import Advice
+from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.faces.dashboard import app, desk
 from twinloop.faces.dashboard.command import prepared
@@ -77,6 +78,12 @@ def test_a_card_and_its_sheet_say_that_the_advice_is_to_stop(store, monkeypatch)
     monkeypatch.setattr(tl.Campaign, "advice", Advice(1, True, 1e-5, 1e-3, 1e-3, True))
     best = dataclasses.replace(look(store).best_test, measured=0.1)
     monkeypatch.setattr(tl.Campaign, "best_test", best)
+    card, sheet = shown()
+    assert not tl.Campaign.load(store, read_only=True).checks().passed
+    assert card == "" and "The advice" not in sheet, (
+        "as the report on the same page, which finds checks that fail"
+    )
+    monkeypatch.setattr(tl.Campaign, "checks", lambda campaign: Checks())
     card, sheet = shown()
     assert card.startswith("The advice is to stop: ") and f"\n{card}\n" in sheet
 

@@ -27,10 +27,10 @@ from twinloop.faces.report.moot import moot
 from twinloop.faces.report.page import report_page
 from twinloop.faces.report.source import OWN
 from twinloop.faces.report.tables.controller import margins as margins_table
-from twinloop.faces.report.verdict import of_next, verdict
 from twinloop.faces.result import summary
 from twinloop.faces.text.controller import advice_text, advice_words
 from twinloop.faces.text.verdict import verdict as verdict_text
+from twinloop.faces.verdict import of_next, verdict, verdict_facts
 from twinloop.records import to_text
 
 pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
@@ -463,6 +463,7 @@ def test_where_the_target_is_missed_nobody_is_told_just_to_stop(good, monkeypatc
     shown = summary(good, {"name": "p"}, {})
     shown["controller"]["off_target"] = str(end)
     shown["advice"] |= {"trusted": True, "stop": True, "gain": 1e-5, "scatter": 1e-3}
+    shown["verdict"] = verdict_facts(verdict(found, checked, shown))
     assert all(words in said(shown) for said in (verdict_text, advice_text))
 
 

@@ -2,17 +2,20 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import options_of
 from twinloop.campaign.remaining import Estimate, duration
 from twinloop.faces.result import plain, to_json
 from twinloop.faces.text import quality_words, render, table
 from twinloop.faces.text.twin import hidden_states
-from twinloop.faces.text.verdict import _verdict_on_twin
+from twinloop.faces.text.verdict import verdict
+from twinloop.faces.verdict import of_next, verdict_facts
 
 
 @pytest.mark.parametrize(
@@ -60,8 +63,8 @@ def test_the_time_left_shrinks_to_nothing_with_the_work(monkeypatch):
 
 
 def result_of_default(**advice):
-    """The least that `render` needs of a run of the preset `default`."""
-    return {
+    """The least that `render` needs of a run of the preset `default`, whose checks all hold."""
+    result = {
         "system": {"name": "rig"}, "preset": "default", "seed": 7, "interrupted": False,
         "quality": {
             **{"kind": "iae", "unit": "rad s", "effort": 0.0, "effort_rate": 0.0},
@@ -101,6 +104,13 @@ def result_of_default(**advice):
         },
         "run_info": {},
     }  # fmt: skip
+    examined = SimpleNamespace(best=object(), margins=object(), ending=None)
+    result["verdict"] = {
+        "twin": {"answer": "Trust it within the flown range", "good": True, "reasons": []},
+        "controller": {"answer": "Fly it", "good": True, "reasons": []},
+        **verdict_facts([of_next(examined, Checks([]), result)]),
+    }
+    return result
 
 
 def test_a_result_of_default_says_what_a_person_must_know():
@@ -136,11 +146,12 @@ def test_advice_to_stop_is_given_where_a_gain_could_not_be_measured(advice, word
 
 def test_gains_that_no_test_was_made_of_have_no_number():
     result = result_of_default()
-    assert "Controller: test 1, " in render(result)
+    assert "Controller: fly it; test 1, " in render(result)
     result["controller"]["test"] = None
     text = render(result)
     assert (
-        "Controller: tuned gains, not asked for yet, " in text and "CONTROLLER TO FLY: NOT FLOWN YET" in text
+        "Controller: fly it; tuned gains, not asked for yet, " in text
+        and "CONTROLLER TO FLY: NOT FLOWN YET" in text
     )
 
 
@@ -199,9 +210,13 @@ def test_a_mass_behind_a_gap_is_said_once_with_its_play():
 
 @pytest.mark.parametrize(
     ("count", "more"),
-    [(1, ""), (2, " There is 1 more serious remark."), (3, " There are 2 more serious remarks.")],
+    [(1, ""), (2, " There is 1 more reason."), (3, " There are 2 more reasons.")],
 )
-def test_a_verdict_counts_the_serious_remarks_that_it_does_not_say(count, more):
-    remarks = [{"severity": "serious", "sentence": "Commands moved and nothing answered."}] * count
-    said = _verdict_on_twin({"twin": {"remarks": remarks}})
-    assert said == f"not reliable yet. Commands moved and nothing answered.{more}"
+def test_a_verdict_counts_the_reasons_that_it_does_not_say(count, more):
+    result = result_of_default()
+    reasons = ["Commands moved and nothing answered."] * count
+    result["verdict"]["twin"] = {"answer": "Do not trust it", "good": False, "reasons": reasons}
+    said, *_ = verdict(result, "twinloop report rig.db").splitlines()
+    begun = f"Twin: do not trust it. Commands moved and nothing answered.{more}"
+    assert said == f"{begun} All checks: twinloop report rig.db"
+    assert verdict(result).splitlines()[0] == begun

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def reported(campaign: Campaign, to: str | Path | None, name: str) -> str:
     """The whole result, as `Campaign.report` describes it."""
     if to is None:
-        text: str = _face("text").render(_face("result").summary(campaign, {"name": name}, {}))
+        result = _face("result").summary(campaign, {"name": name}, {})
+        text: str = _face("text").render(result, evidence="print(campaign.checks())")
         return text
     path = Path(to)
     _face("files").check_writable(path, [".html"])

@@ -69,6 +69,8 @@ def advised_to_stop(campaign: Campaign) -> str:
     best, _ = controller_to_fly(campaign)
     if best is None or best.measured is None:
         return ""  # there is a flight to be made
+    if not campaign.checks().passed:
+        return ""  # as the verdict says: what fails is to be mended first
     return (
         "The advice is to stop: for the controller another flight would bring less than the scatter of one"
         " measurement."

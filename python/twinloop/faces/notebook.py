@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from twinloop.campaign import Campaign
+from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.figure import Band, Figure, Line, Panel
 from twinloop.faces.figures.svg import drawing
 from twinloop.faces.result import summary
@@ -40,9 +41,10 @@ def html(value: object) -> str:
 def _campaign(campaign: Campaign) -> str:
     if not campaign.experiments:
         return f"<p>{escape(repr(campaign))}: nothing was told yet.</p>"
-    lines = verdict(summary(campaign, {"name": "campaign"}, {})).splitlines()
+    found = campaign.examine()
+    lines = verdict(summary(campaign, {"name": "campaign"}, {}, found), "below.").splitlines()
     said = "".join(f"<p>{escape(line)}</p>" for line in lines)
-    rows = [[check.verdict, check.name, check.sentence] for check in campaign.checks()]
+    rows = [[check.verdict, check.name, check.sentence] for check in checks(found)]
     return said + _table(["", "check", "what was found"], rows)
 
 

@@ -20,10 +20,12 @@ from twinloop.campaign.assessment import (
 )
 from twinloop.campaign.cost import Cost
 from twinloop.campaign.examination.beside import Beside
+from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.excited import hidden
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
+from twinloop.faces.verdict import verdict, verdict_facts
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 from twinloop.planning.quality import Quality, quality_unit
@@ -34,13 +36,19 @@ Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Result = dict[str, Value]
 
 
-def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[str, object]) -> Result:
+def summary(
+    campaign: Campaign,
+    system: Mapping[str, object],
+    run_info: Mapping[str, object],
+    examined: Examination | None = None,
+) -> Result:
     """What a campaign found.
 
     Args:
         campaign: with at least one run; what it has not learnt yet is learnt now.
         system: what was experimented on: its name and settings.
         run_info: all that may differ between equal runs: times, threads, host, command line, versions.
+        examined: its examination, where it was made already; None: it is made now.
 
     Returns:
         A dictionary of numbers, texts, lists and dictionaries; a number that is not finite is None.
@@ -49,7 +57,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         KeyboardInterrupt: while learning; calling again gives the best so far.
         NotAvailable: nothing was told.
     """
-    found = campaign.examine()
+    found = campaign.examine() if examined is None else examined
     twin, best, identified = found.twin, found.best, campaign.options.identifies
     foretold = {each.place: each.predicted for each in found.unseen}
     result: dict[str, object] = {
@@ -97,6 +105,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
     lesson = latest_lesson(campaign)
     if lesson is not None:
         _add_identified(result, campaign, lesson)
+    result["verdict"] = verdict_facts(verdict(found, checks(found), result))
     return plain_dict(result)
 
 

@@ -14,6 +14,7 @@ from twinloop.campaign.assessment import behind
 from twinloop.campaign.keeping import heading, look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.answering import name_option, next_command
+from twinloop.faces.answers import DO_NOT_FLY
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
 from twinloop.faces.opening import say_if_changed
@@ -111,8 +112,9 @@ def show(store: str, name: str | None, as_json: bool) -> None:
     if result is not None:
         # Looking took no time that anyone asks for.
         shown = {**result, "run_info": {**result["run_info"], "seconds": None}}
-        text += f"\n{render(shown, _learnt(campaign, held))}"
-        if result["controller"] is not None and result["controller"]["test"] is None:
+        text += f"\n{render(shown, _learnt(campaign, held), stored_as.to_type('report'))}"
+        untried = result["controller"] is not None and result["controller"]["test"] is None
+        if untried and result["verdict"]["controller"]["answer"] != DO_NOT_FLY:
             text += f"To fly the tuned gains: {stored_as.to_type('ask', '--last')}\n"
     say_if_changed(store, campaign, held.name)
     _print({"store": facts, "result": result}, text, as_json)

@@ -29,6 +29,8 @@ from twinloop.test import Test
 
 Answer = TypeVar("Answer")
 Command = TypeVar("Command", bound=Callable[..., Any])
+KEPT_NOWHERE = "run it with --store FILE.db, then twinloop report FILE.db"
+"""What shows the checks of a campaign that no store keeps."""
 
 
 def answers(command: Command) -> Command:
@@ -141,6 +143,7 @@ def work(
         if not campaign.experiments or knows_nothing(campaign):
             raise KeyboardInterrupt
         result = _uninterrupted(lambda: summary(campaign, described(name, rig), clock.info()))
+        evidence = KEPT_NOWHERE if campaign.store is None else next_command(campaign, "report")
     finally:
         campaign.close()
     try:
@@ -148,7 +151,7 @@ def work(
             write_whole(output, to_json(result))
             click.echo(f"Result: {output}", err=True)
     finally:  # a full disk must not take the result with it
-        show_result(result, as_json)
+        show_result(result, as_json, evidence)
     if plot is not None:
         _uninterrupted(lambda: campaign.plot(plot))
         click.echo(f"Picture: {plot}", err=True)
@@ -178,14 +181,15 @@ def _say_against(
         watch.say(line)
 
 
-def show_result(result: Result, as_json: bool) -> None:
+def show_result(result: Result, as_json: bool, evidence: str) -> None:
     """Prints a result.
 
     Args:
         result: a `twinloop.faces.result.summary`.
         as_json: whether as JSON.
+        evidence: the command that shows all checks.
     """
-    text = to_json(result, ascii_only=not is_utf_8()) if as_json else render(result)
+    text = to_json(result, ascii_only=not is_utf_8()) if as_json else render(result, evidence=evidence)
     click.echo(text, nl=False)
 
 

@@ -25,9 +25,9 @@ from twinloop.faces.report.tables import controller as of_controller
 from twinloop.faces.report.tables import flights as of_flights
 from twinloop.faces.report.tables import twin as of_twin
 from twinloop.faces.report.tables.table import Table, shown_spread
-from twinloop.faces.report.verdict import evidence, verdict
 from twinloop.faces.result import summary
 from twinloop.faces.text.controller import advice_words
+from twinloop.faces.verdict import evidence, verdict
 from twinloop.planning.leaving import risk_words
 
 UNNAMED = "campaign"
@@ -89,8 +89,8 @@ def report_page(
         NotAvailable: nothing was told, or Jinja2 is missing.
     """
     template = templates().get_template("page.html")
-    found, result = campaign.examine(), summary(campaign, system, run_info)
-    checked = checks(found)
+    found = campaign.examine()
+    result, checked = summary(campaign, system, run_info, found), checks(found)
     if not controller:
         found.best = None
     text: str = template.render(

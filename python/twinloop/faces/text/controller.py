@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop._ground.texts import two_digits
+from twinloop.faces import answers
 from twinloop.faces.text.table import cell, table
 from twinloop.faces.text.words import held_at, is_bounded, predicted_flights, with_unit
 from twinloop.planning.leaving import risk_of_what, risk_words
@@ -63,15 +64,20 @@ def controller_text(result: Mapping[str, Any]) -> str:
         qualities.append(["first controller", first["predicted"], None, first["measured"]])
     gently = any(run["excited"] for run in result["experiments"][:1])
     excited = "\nThe first controller was excited when it was flown." if gently else ""
+    title = "CONTROLLER, NOT TO BE FLOWN" if _is_refused(result) else "CONTROLLER TO FLY"
     return "\n".join(
         [
-            f"CONTROLLER TO FLY: {state}",
+            f"{title}: {state}",
             _table(best, first),
             "",
             table(["quality", "predicted", "± spread", "measured"], qualities),
             f"{best['why']}{_risk(best['risk'], result)}{excited}",
         ]
     )
+
+
+def _is_refused(result: Mapping[str, Any]) -> bool:
+    return bool(result["verdict"]["controller"]["answer"] == answers.DO_NOT_FLY)
 
 
 def _risk(risk: float | None, result: Mapping[str, Any]) -> str:
@@ -98,6 +104,11 @@ def advice_words(result: Mapping[str, Any]) -> str:
         return "No flight was planned yet; ask for one to see what it would bring."
     if not advice["trusted"]:
         return "The twin is not reliable yet, so it cannot say. Look into the remarks, then fly another test."
+    if result["verdict"]["twin"]["good"] is False:
+        return (
+            "The twin is not to be trusted yet, so it cannot say. Look into the checks that fail, then fly another"
+            " test."
+        )
     share = (
         f", {two_digits(100.0 * advice['share'])} % of what it is now" if advice["share"] is not None else ""
     )
@@ -117,6 +128,8 @@ def advice_words(result: Mapping[str, Any]) -> str:
 
 def _stop(result: Mapping[str, Any]) -> str:
     """That no flight is needed, with what it does not bring the controller to."""
+    if _is_refused(result):
+        return "Another flight would hardly change the controller, which is not to be flown: ask for a calmer one."
     best = result["controller"]
     off = None if best is None else best.get("off_target")
     return f"For the controller, stop, or change the task. {off}" if off else "For the controller, stop."

@@ -13,12 +13,13 @@ from twinloop.faces.text.words import counted, is_bounded, predicted_flights, qu
 from twinloop.planning.leaving import short_risk
 
 
-def render(result: Mapping[str, Any], state: str | None = None) -> str:
+def render(result: Mapping[str, Any], state: str | None = None, evidence: str = "") -> str:
     """The result of a campaign, for a person.
 
     Args:
         result: a `twinloop.faces.result.summary`.
         state: words before the number of its experiments; None: that it was interrupted, or has finished.
+        evidence: what shows all checks, such as a command to type, said where one fails; empty: it is not said.
 
     Returns:
         Text.
@@ -26,7 +27,7 @@ def render(result: Mapping[str, Any], state: str | None = None) -> str:
     if "advice" in result:
         parts = [
             _title(result, state),
-            verdict(result),
+            verdict(result, evidence),
             equations_text(result),
             states_text(result),
             errors_text(result),
@@ -38,7 +39,7 @@ def render(result: Mapping[str, Any], state: str | None = None) -> str:
     else:
         parts = [
             _title(result, state),
-            verdict(result),
+            verdict(result, evidence),
             equations_text(result),
             program_errors_text(result),
             tuned_controller_text(result),

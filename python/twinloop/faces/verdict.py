@@ -1,9 +1,9 @@
-"""The verdict: three sentences with numbers, in plain words, each with links to its evidence."""
+"""The verdict on a twin, its controller and what comes next: the one that report, terminal and JSON all give."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.checking import COLOURED
 from twinloop.campaign.examination.examination import Examination
+from twinloop.faces import answers
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
 from twinloop.faces.text.words import every, flown_words, quality_words
@@ -58,6 +59,7 @@ class Sentence:
         good: whether it says yes; None where it says neither.
         text: with its numbers.
         links: where the evidence stands, and what to call it.
+        reasons: against the subject, a sentence each, the strongest first.
     """
 
     subject: str
@@ -65,6 +67,7 @@ class Sentence:
     good: bool | None
     text: str
     links: tuple[tuple[str, str], ...]
+    reasons: tuple[str, ...] = ()
 
 
 def verdict(
@@ -78,6 +81,21 @@ def verdict(
         result: its `twinloop.faces.result.summary`.
     """
     return _of_twin(found, checks), _of_controller(found, checks, result), of_next(found, checks, result)
+
+
+def verdict_facts(sentences: Sequence[Sentence]) -> dict[str, object]:
+    """A verdict for programs, and for those who word it in less space than a page has.
+
+    Args:
+        sentences: of a `verdict`.
+
+    Returns:
+        By subject: `answer`, `good`, `reasons`.
+    """
+    return {
+        each.subject.lower(): {"answer": each.answer, "good": each.good, "reasons": list(each.reasons)}
+        for each in sentences
+    }
 
 
 PLAIN = {
@@ -109,7 +127,10 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
                 f" (up to {100.0 * share:.0f} % of the correlations are beyond their 99 % limits): it lacks"
             )
             text += " an effect"
-        return Sentence("Twin", "Do not trust it", False, f"{_capital(text)}.{unseen}", _links(found, failed))
+        return Sentence(
+            "Twin", answers.DO_NOT_TRUST, False, f"{_capital(text)}.{unseen}", _links(found, failed),
+            _against_twin(found, failed),
+        )  # fmt: skip
     text = unseen.strip()
     own, causes = found.autocorrelation, found.crosscorrelation
     if own is not None and causes is not None:
@@ -119,10 +140,17 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
             f" {100.0 * COLOURED:.0f} % are allowed."
         )
     return Sentence(
-        "Twin", "Trust it within the flown range", True, f"{text} {_scope(found)}".strip(),
+        "Twin", answers.TRUST, True, f"{text} {_scope(found)}".strip(),
         (("unseen", "unseen flight"), ("ranges", "flown range"), ("crosscorrelation", "residuals"),
          ("checks", "all checks")),
     )  # fmt: skip
+
+
+def _against_twin(found: Examination, failed: Sequence[Check]) -> tuple[str, ...]:
+    """Each serious remark, which says what to do, then each other check that fails, in the order of the checks."""
+    remarks = [str(remark) for remark in found.twin.remarks if remark.serious]
+    known = [check for check in failed if check.name == "remarks"]
+    return (*(remarks if known else ()), *(check.sentence for check in failed if check not in known))
 
 
 def _scope(found: Examination) -> str:
@@ -165,7 +193,10 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
     best, first = result["controller"], result["first_controller"]
     failed = [check for check in checks.failed if check.subject == "controller"]
     if best is None or found.best is None:
-        return Sentence("Controller", "None to fly", False, found.no_controller, (("checks", "all checks"),))
+        return Sentence(
+            "Controller", answers.NONE_TO_FLY, False, found.no_controller, (("checks", "all checks"),),
+            (found.no_controller,),
+        )  # fmt: skip
     measure = result["quality"]
     quality = quality_words(measure["kind"], measure["unit"]).rstrip(")")
     worth = f"{quality}{'; ' if measure['unit'] else ' ('}lower is better): {_predicted(found, best)}"
@@ -178,25 +209,27 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
     if failed:
         return Sentence(
             "Controller",
-            "Do not fly it",
+            answers.DO_NOT_FLY,
             False,
             f"{failed[0].sentence} {_capital(worth)}.{_off_target(found)}",
             _links(found, failed),
+            tuple(check.sentence for check in failed),
         )
     if not checks.twin_passed:
         rests = "The prediction rests on a twin that is not to be trusted: rely on what was flown."
         text = f"{_capital(worth)}. {rests}"
         return Sentence(
             "Controller",
-            "Not on this twin's prediction",
+            answers.UNRELIABLE_PREDICTION,
             False,
             text,
             (("step", "step"), ("qualities", "flights")),
+            (rests,),
         )
     off = _off_target(found)
-    answer = "Fly it" if best["measured"] is None else "Keep it"
+    answer = answers.FLY if best["measured"] is None else answers.KEEP
     return Sentence(
-        "Controller", f"{answer}, but it misses its target" if off else answer, None if off else True,
+        "Controller", f"{answer}{answers.MISSING_ITS_TARGET}" if off else answer, None if off else True,
         f"{_capital(worth)}.{off}{margins}",
         (("step", "step"), ("margins", "margins"), ("gains-table", "gains")),
     )  # fmt: skip
@@ -243,37 +276,52 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
     unit = result["quality"]["unit"]
     links = (("next", "next experiment"),)
     off = _off_target(found)
-    stop = "Stop, or change the task" if off else "Stop"
+    stop = answers.STOP_OR_OTHER_TASK if off else answers.STOP
     good = None if off else True
+    if found.best is None:
+        text = "There is no controller to fly: look into the checks that fail, and fly one that you trust."
+        return Sentence(
+            "Next", answers.FLY_ANOTHER_CONTROLLER, False, text, (("checks", "all checks"), *links)
+        )
     if advice is None:
         return Sentence(
-            "Next", "You decide", None, "The preset paper does not say what another test would bring.", links
+            "Next",
+            answers.YOU_DECIDE,
+            None,
+            "The preset paper does not say what another test would bring.",
+            links,
         )
     if not checks.twin_passed:
         text = (
             "Look into the checks that fail, then fly again where they point: the twin's estimate of what"
             " another flight would bring is no better than the twin."
         )
-        return Sentence(
-            "Next", "Find out what the twin lacks", False, text, (("checks", "all checks"), *links)
+        return Sentence("Next", answers.FIND_OUT, False, text, (("checks", "all checks"), *links))
+    if advice["gain"] is not None and advice["stop"] is None and not advice["trusted"]:
+        text = (
+            "The twin cannot say what another flight would bring, since it did not follow its runs when that was"
+            " estimated, or no command acts in it: look into the remarks, then fly another test."
         )
+        return Sentence("Next", answers.FLY_ANOTHER, None, text, (("remarks", "remarks"), *links))
     failed = [check for check in checks.failed if check.subject == "controller"]
     if failed and found.best is not None and (advice["stop"] or advice["gain"] == 0.0):
         knows = "The twin knows enough: another flight would hardly improve the quality."
         if found.margins is None:
             text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"
-            return Sentence(
-                "Next", "Change the task or the controller", None, text, (*_links(found, failed), *links)
-            )
+            return Sentence("Next", answers.OTHER_TASK, None, text, (*_links(found, failed), *links))
         text = (
             f"{knows} What fails is the controller:"
             f" {failed[0].name}. Begin again from these flights with narrower bounds of its gains, or with effort in"
             f" the quality.{off}"
         )
-        return Sentence("Next", "Ask for a calmer controller", None, text, (*_links(found, failed), *links))
+        return Sentence("Next", answers.CALMER_CONTROLLER, None, text, (*_links(found, failed), *links))
     if advice["gain"] is None:
         return Sentence(
-            "Next", "Ask", None, "No flight was planned yet; ask for one to see what it would bring.", links
+            "Next",
+            answers.ASK,
+            None,
+            "No flight was planned yet; ask for one to see what it would bring.",
+            links,
         )
     if advice["gain"] == 0.0:
         text = f"The models agree on what to fly: another flight would not improve the quality.{off}"
@@ -291,7 +339,7 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
     text = f"Another flight may improve the quality by {in_unit(gain, unit)}"
     return Sentence(
         "Next",
-        "Fly another",
+        answers.FLY_ANOTHER,
         None,
         f"{text}; one measurement scatters by {in_unit(scatter, unit)}.",
         links,

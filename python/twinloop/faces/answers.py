@@ -1,0 +1,22 @@
+"""The answers of a verdict, in a word or two: the same on a report's page, in a terminal and in JSON."""
+
+TRUST = "Trust it within the flown range"
+DO_NOT_TRUST = "Do not trust it"
+
+NONE_TO_FLY = "None to fly"
+DO_NOT_FLY = "Do not fly it"
+UNRELIABLE_PREDICTION = "Not on this twin's prediction"
+FLY = "Fly it"
+KEEP = "Keep it"
+MISSING_ITS_TARGET = ", but it misses its target"
+"""What is added to either of the two before."""
+
+FLY_ANOTHER_CONTROLLER = "Fly another controller that you trust"
+YOU_DECIDE = "You decide"
+FIND_OUT = "Find out what the twin lacks"
+OTHER_TASK = "Change the task or the controller"
+CALMER_CONTROLLER = "Ask for a calmer controller"
+ASK = "Ask"
+STOP = "Stop"
+STOP_OR_OTHER_TASK = "Stop, or change the task"
+FLY_ANOTHER = "Fly another"
