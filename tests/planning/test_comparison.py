@@ -314,6 +314,20 @@ def test_a_candidate_that_known_disturbances_drive_out_more_often_than_the_flown
     assert other.disagreement <= chosen.disagreement and other.safe
 
 
+@pytest.mark.parametrize(("share", "flies"), [(0.49, True), (0.51, False)])
+def test_a_candidate_that_known_disturbances_make_half_as_bad_again_as_the_best_flight_gives_way(share, flies):
+    chosen = compared(goal="both").proposal()
+    flown = replace(FLOWN, good=1.01 * chosen.predicted)
+
+    def on(test):
+        mine = test.genes.tobytes() == chosen.genes.tobytes()
+        return Moved((1.0 + share) * flown.good - chosen.predicted if mine else 0.0, 0.0)
+
+    moved = compared(replace(COMMITTEE, gusts=SimpleNamespace(on=on)), flown, goal="both").proposal()
+    assert (moved.genes.tobytes() == chosen.genes.tobytes()) == flies
+    assert moved.safe
+
+
 @pytest.mark.parametrize("goal", ["both", "control"])
 def test_where_the_gains_that_promise_most_bear_no_gust_some_on_the_way_back_from_them_fly(goal):
     planner = planner_of(KNOWN, candidates=1024, draws=DRAWS)

@@ -27,6 +27,8 @@ TRIED = 128
 """Candidates at most that are flown under noise before the safest one is taken."""
 TOGETHER = 4
 """Of them at once."""
+WORST = 1.5
+"""Ratio of a flight's predicted quality, in the disturbances that are known, to the best one measured, at most."""
 ANYWHERE = 64
 """Flights by which it is asked how much of the twin is unknown."""
 
@@ -213,7 +215,7 @@ class Comparison:
             flights = self._noisy(batch)
             lasts = ~outside(flights.worst_usage) & (flights.mean <= worst) & self._bears_ending(batch)
             for i in np.flatnonzero(lasts).tolist():
-                if self._bears_gusts(batch[i]):
+                if self._bears_gusts(batch[i], float(flights.mean[i])):
                     return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
         return None
 
@@ -225,12 +227,20 @@ class Comparison:
         bears[np.array(chosen) >= self.drafts.repeats] |= self.flown.flies
         return bears
 
-    def _bears_gusts(self, candidate: int) -> bool:
-        """Whether known disturbances drive a candidate out of the envelope no more often than the best gains flown."""
+    def _bears_gusts(self, candidate: int, predicted: float) -> bool:
+        """Whether known disturbances drive a candidate out of the envelope no more often than the best gains flown.
+
+        Nor may they make it far worse than that flight was measured, in the disturbances that it met.
+
+        Args:
+            candidate: its number.
+            predicted: its quality without them.
+        """
         drafts = self.drafts
         start, target = (states[candidate] for states in drafts.ends)
         test = self.judge.test(drafts.genes[candidate], start, target, drafts.excitation[candidate])
-        return self.committee.moved_by_gusts(test).left <= self._left_in_gusts
+        moved = self.committee.moved_by_gusts(test)
+        return moved.left <= self._left_in_gusts and predicted + moved.bias <= WORST * self.flown.good
 
     @cached_property
     def _left_in_gusts(self) -> int:
