@@ -315,7 +315,9 @@ def test_a_candidate_that_known_disturbances_drive_out_more_often_than_the_flown
 
 
 @pytest.mark.parametrize(("share", "flies"), [(0.49, True), (0.51, False)])
-def test_a_candidate_that_known_disturbances_make_half_as_bad_again_as_the_best_flight_gives_way(share, flies):
+def test_a_candidate_that_known_disturbances_make_half_as_bad_again_as_the_best_flight_gives_way(
+    share, flies
+):
     chosen = compared(goal="both").proposal()
     flown = replace(FLOWN, good=1.01 * chosen.predicted)
 
