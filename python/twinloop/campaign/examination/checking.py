@@ -183,14 +183,14 @@ def _delay(worst: LoopMargins, dt: float, flown: int, bounded: bool) -> Check:
     slides = ", as dry friction slides," if worst.friction == "sliding" else ""
     borne = (
         f"The loop with the smallest delay margin, {worst.loop}, stays stable{slides} with up to"
-        f" {shown_time(worst.delay)} more, {periods:.3g} periods"
+        f" {shown_time(worst.delay)} more, {periods:.3g} period{'s' * (f'{periods:.3g}' != '1')}"
         if math.isfinite(periods)
         else "No delay makes any loop unstable"
     )
     keeps = "stays in the envelope" if bounded else "does not diverge"
     flight = (
-        f"the flight of the task {keeps} with up to {flown} periods more, of {MOST} that were tried, on each model that"
-        " flies it at all"
+        f"the flight of the task {keeps} with up to {flown} period{'s' * (flown != 1)} more, of {MOST} that were"
+        " tried, on each model that flies it at all"
         if flown
         else "the flight of the task bears not one period more"
     )
