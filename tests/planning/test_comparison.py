@@ -314,18 +314,22 @@ def test_a_candidate_that_known_disturbances_drive_out_more_often_than_the_flown
     assert other.disagreement <= chosen.disagreement and other.safe
 
 
-@pytest.mark.parametrize(("share", "flies"), [(0.49, True), (0.51, False)])
+@pytest.mark.parametrize(
+    ("goal", "share", "flies"),
+    [("both", 0.49, True), ("both", 0.51, False), ("control", 0.51, False), ("model", 5.0, True)],
+)
 def test_a_candidate_that_known_disturbances_make_half_as_bad_again_as_the_best_flight_gives_way(
-    share, flies
+    goal, share, flies
 ):
-    chosen = compared(goal="both").proposal()
+    chosen = compared(goal=goal).proposal()
     flown = replace(FLOWN, good=1.01 * chosen.predicted)
+    assert same_bits(compared(flown=flown, goal=goal).proposal().genes, chosen.genes)
 
     def on(test):
         mine = test.genes.tobytes() == chosen.genes.tobytes()
         return Moved((1.0 + share) * flown.good - chosen.predicted if mine else 0.0, 0.0)
 
-    moved = compared(replace(COMMITTEE, gusts=SimpleNamespace(on=on)), flown, goal="both").proposal()
+    moved = compared(replace(COMMITTEE, gusts=SimpleNamespace(on=on)), flown, goal=goal).proposal()
     assert (moved.genes.tobytes() == chosen.genes.tobytes()) == flies
     assert moved.safe
 
