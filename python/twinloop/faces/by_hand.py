@@ -95,7 +95,7 @@ def ask(
         else:
             known = campaign.waiting_last if last else next(iter(campaign.waiting), None)
             test = campaign.ask(last=last) if again or known is None else known
-        text, described = _shown(campaign, test)
+        text, described = _shown(campaign, test, advised_to_stop(campaign))
         click.echo(to_json(described) if as_json else text, nl=False)
 
 
@@ -120,7 +120,8 @@ def _ask_batch(
                 "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
                 f" {next_command(campaign, 'ask')}."
             )
-        shown = [_shown(campaign, test) for test in campaign.ask_batch(batch)]
+        tests, advice = campaign.ask_batch(batch), advised_to_stop(campaign)
+        shown = [_shown(campaign, test, advice) for test in tests]
         if as_json:
             click.echo(to_json({"tests": [described for _, described in shown]}), nl=False)
             return
@@ -131,14 +132,14 @@ def _ask_batch(
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
 
-def _shown(campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
-    """The sheet of a test, and the same as facts; its file is written."""
+def _shown(campaign: Campaign, test: Test, advice: str) -> tuple[str, dict[str, object]]:
+    """The sheet of a test, with the advice to stop if there is one, and the same as facts; its file is written."""
     place, predicted = stored_as(campaign), foreseen(campaign, test)
     assert place is not None  # it was opened in a store
     file = columns_file(place, test)
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
-    advice, flown, chosen = advised_to_stop(campaign), campaign.runs > 0, is_chosen(campaign, test)
+    flown, chosen = campaign.runs > 0, is_chosen(campaign, test)
     text = sheet(
         place,
         test,
