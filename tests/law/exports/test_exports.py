@@ -629,15 +629,22 @@ def run(*arguments):
     )
 
 
-def test_what_speaks_against_a_twin_goes_with_its_file_and_keeps_it_there(tmp_path):
+SAID = (
+    Remark("free-run", "serious", "It misses its flights."),
+    Remark("form", "note", "The form was searched."),
+)
+
+
+def spoken_against():
+    """A twin with a serious remark, and one that is not."""
     twin = TWINS["acceleration"]()
-    said = (
-        Remark("free-run", "serious", "It misses its flights."),
-        Remark("form", "note", "The form was searched."),
-    )
-    told = tl.Twin(twin.model, twin.signals, twin.errors, flights=twin.flights, remarks=said)
+    return tl.Twin(twin.model, twin.signals, twin.errors, flights=twin.flights, remarks=SAID)
+
+
+def test_what_speaks_against_a_twin_goes_with_its_file_and_keeps_it_there(tmp_path):
+    told = spoken_against()
     (path,) = told.export(tmp_path / "twin.json")
-    assert tl.load_twin(path).remarks == said
+    assert tl.load_twin(path).remarks == SAID
     refused = run(path, "--to", "python")
     assert refused.returncode == 1 and "found: It misses its flights. Learn" in refused.stderr
     assert "def simulate(" in run(path, "--to", "python", "--force").stdout
@@ -647,12 +654,7 @@ def test_what_speaks_against_a_twin_goes_with_its_file_and_keeps_it_there(tmp_pa
 
 
 def test_what_speaks_against_a_twin_is_a_warning_where_it_is_taken_away_in_python(tmp_path):
-    twin = TWINS["acceleration"]()
-    said = (
-        Remark("free-run", "serious", "It misses its flights."),
-        Remark("form", "note", "The form was searched."),
-    )
-    told = tl.Twin(twin.model, twin.signals, twin.errors, flights=twin.flights, remarks=said)
+    told = spoken_against()
     for to in ("latex", tmp_path / "twin.json"):
         with pytest.warns(tl.RemarkWarning) as warned:
             told.export(to)
@@ -661,7 +663,8 @@ def test_what_speaks_against_a_twin_is_a_warning_where_it_is_taken_away_in_pytho
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         again = tl.load_twin(tmp_path / "twin.json")
-        assert again.export("latex", force=True) == twin.export("latex")  # forced, or nothing to be said
+        plain = TWINS["acceleration"]()
+        assert again.export("latex", force=True) == plain.export("latex")  # forced, or nothing to be said
     with pytest.warns(tl.RemarkWarning, match="It misses"):
         again.export("python")
 
