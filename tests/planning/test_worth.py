@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from twinloop.planning.settings import PlanningOptions
-from twinloop.planning.worth import apart, gain, limit
+from twinloop.planning.worth import apart, gain, in_vain, limit
 
 OPTIONS = PlanningOptions(worse=0.05, accuracy=0.01)
 
@@ -25,6 +25,23 @@ def test_members_are_apart_by_the_share_in_the_middle():
     assert apart(np.array([[1.0, np.inf], [1.0, 3.0]])) == pytest.approx(0.5)
     assert apart(np.array([[1.0, np.inf], [1.0, np.inf]])) == 0.0
     assert apart(np.full((2, 3), np.inf)) == 0.0 and apart(np.zeros((2, 3))) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("predicted", "spread", "vain"),
+    [
+        (1.99, 9.0, False),  # better is promised
+        (2.0, 1.0, False),  # half as bad again within one spread
+        (2.0, 1.01, True),
+        (3.01, 0.0, True),  # it is far worse
+        (np.inf, np.inf, True),
+    ],
+)
+def test_a_flight_is_in_vain_that_promises_nothing_better_and_may_be_half_as_bad_again(
+    predicted, spread, vain
+):
+    assert in_vain(predicted, spread, 2.0) == vain
+    assert not in_vain(predicted, spread, np.inf)  # nothing better is known
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,13 @@ class Candidates:
     ends: Ends
     repeats: int
 
+    @classmethod
+    def of_best(cls, judge: Judge, flown: Flown) -> Candidates:
+        """The best gains flown alone, without excitation, on the campaign's task."""
+        task, ends = judge.task, (judge.task.initial_state, judge.task.target_state)
+        start, target = (states[np.newaxis] for states in ends)
+        return cls(flown.best[np.newaxis], np.zeros((1, task.steps, judge.signals.n_u)), (start, target), 0)
+
     def quiet(self) -> Candidates:
         """The same without excitation, all of them on the task of the first."""
         ends = tuple(np.repeat(states[:1], len(states), axis=0) for states in self.ends)

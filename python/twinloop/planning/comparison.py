@@ -20,15 +20,13 @@ from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.reach import reach_of
 from twinloop.planning.reasons import Why, reason
 from twinloop.planning.settings import PlanningOptions
-from twinloop.planning.worth import apart, gain, limit
+from twinloop.planning.worth import WORST, apart, gain, limit
 
 Flags = NDArray[np.bool_]
 TRIED = 128
 """Candidates at most that are flown under noise before the safest one is taken."""
 TOGETHER = 4
 """Of them at once."""
-WORST = 1.5
-"""Ratio of a flight's predicted quality, in known disturbances, to the best one measured, at most."""
 ANYWHERE = 64
 """Flights by which it is asked how much of the twin is unknown."""
 
@@ -259,7 +257,7 @@ class Comparison:
             fared=self.flown.fared,
             # Nobody knows where an excitation leads once the last one was too much, and it begins anew.
             stronger=self.committee.trusted or self.flown.borne > 0,
-            exploits=self.wanted.exploit and chosen == 0,
+            exploits=self.wanted.exploit and chosen == 0 < self.drafts.repeats,
             plain=self.wanted.plain,
             repeats=chosen >= self.drafts.repeats,
             safe=safe,

@@ -16,7 +16,7 @@ from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Purpose
 from twinloop.controllers import Family
 from twinloop.planning.beyond import bears_ending
-from twinloop.planning.candidates import candidates, directions_of, unknown_excitation
+from twinloop.planning.candidates import Candidates, candidates, directions_of, unknown_excitation
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, swing_of
 from twinloop.planning.gains import scores_of, tune_gains
@@ -230,6 +230,18 @@ class Planner(Judge):
         if last and not found.wanted.plain and not as_wanted:
             return self._compared(committee, tuned, flown, replace(wanted, plain=True)).proposal()
         return proposal
+
+    def again(self, committee: Committee, flown: Flown, number: int) -> Proposal:
+        """The best gains flown, once more, without excitation.
+
+        Args:
+            committee: that judges.
+            flown: so far; its best gains are known to fly.
+            number: of the test, for its streams.
+        """
+        drafts = Candidates.of_best(self, flown)
+        wanted = Wanted("control", number, exploit=True, plain=True, last=True)
+        return Comparison(self, self.options, committee, drafts, flown, wanted).proposal()
 
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""

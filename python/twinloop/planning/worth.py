@@ -7,6 +7,9 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop.planning.settings import PlanningOptions
 
+WORST = 1.5
+"""Ratio of a flight's predicted quality, in known disturbances, to the best one measured, at most."""
+
 
 def gain(choices: Floats) -> float:
     """Quality that knowing the right member would bring: the expected value of perfect information.
@@ -36,6 +39,17 @@ def apart(choices: Floats) -> float:
     mean, spread = choices[:, whole].mean(axis=0), choices[:, whole].std(axis=0)
     shares[whole] = np.minimum(1.0, spread / np.where(mean > 0.0, mean, 1.0))
     return float(np.median(shares[some])) if some.any() else 0.0
+
+
+def in_vain(predicted: float, spread: float, good: float) -> bool:
+    """Whether a flight from which nothing is to be learnt promises nothing better, and may be far worse.
+
+    Args:
+        predicted: its quality.
+        spread: standard deviation of the prediction, as earlier ones came true.
+        good: quality of the best flight that kept the envelope; infinite where none has.
+    """
+    return predicted >= good and predicted + spread > WORST * good
 
 
 def limit(

@@ -369,6 +369,25 @@ def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin,
     assert not explored.experiments[1].test.reason.startswith("The best gains")
 
 
+def test_a_last_experiment_that_would_be_in_vain_flies_the_best_gains_flown_as_they_are(begin, pendulum):
+    usual, asked = told(begin(), pendulum).ask(last=True), []
+    campaign = told(begin(), pendulum)
+    first = campaign.experiments[0]
+
+    def vain(*of_it):
+        asked.append(of_it)
+        return True
+
+    with mock.patch.object(method_of_default, "in_vain", vain):
+        test = campaign.ask(last=True)
+        assert campaign.waiting_last is test
+        assert campaign.ask().number != test.number  # none that is not the last is held against that
+    assert asked == [(usual.predicted, usual.spread, first.quality)]
+    assert same_bits(test.genes, first.test.genes) and not same_bits(usual.genes, test.genes)
+    assert test.excitation is None and test.reason == "The best gains flown, again: they are known to fly."
+    assert test.predicted != usual.predicted and test.spread > 0.0
+
+
 def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further_than_the_next_flight(
     begin, pendulum
 ):

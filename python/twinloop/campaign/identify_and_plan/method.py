@@ -40,6 +40,7 @@ from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared, Flown, Proposal
 from twinloop.planning.scored import Scored
 from twinloop.planning.seen import Seen
+from twinloop.planning.worth import in_vain
 from twinloop.records import Record
 from twinloop.test import Test
 
@@ -164,22 +165,19 @@ class IdentifyAndPlan:
         tuned = self._gains(book)
         waits = _waiting_last(book, tuned) is not None
         final = last and self.options.exploit_last and not waits
+        flown = self._flown(book, best, tuned)
         found = self.planner.propose(
             committee,
             tuned,
-            self._flown(book, best, tuned),
+            flown,
             self.setup.goal,
             len(book.tests),
             final or (self.setup.goal == "control" and len(book.flown) > 1 and not waits),
             final,
         )
-        gusts = committee.moved_by_gusts(self._as_test(book, found))
-        predicted, spread = gusts.added_to(found.predicted, found.spread)
-        spread = calibrated(spread, predicted, book.experiments)
-        own = standing.fared(book, found.genes, found.excitation is not None)
-        unproven = unproven_risk(book.experiments, own, self.setup.signals, committee.explains)
-        risk = max(found.risk, own.risk, gusts.risk, unproven)
-        found = replace(found, predicted=predicted, spread=spread, risk=risk)
+        found = self._expected(book, committee, found)
+        if final and flown.flies and in_vain(found.predicted, found.spread, flown.good):
+            found = self._expected(book, committee, self.planner.again(committee, flown, len(book.tests)))
         test = book.new_test(
             found.genes,
             excitation=found.excitation,
@@ -195,11 +193,26 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
 
+    def _expected(self, book: Logbook, committee: Committee, found: Proposal) -> Proposal:
+        """A proposal with what known disturbances and the record of earlier predictions make of it."""
+        gusts = committee.moved_by_gusts(self._as_test(book, found))
+        predicted, spread = gusts.added_to(found.predicted, found.spread)
+        spread = calibrated(spread, predicted, book.experiments)
+        own = standing.fared(book, found.genes, found.excitation is not None)
+        unproven = unproven_risk(book.experiments, own, self.setup.signals, committee.explains)
+        risk = max(found.risk, own.risk, gusts.risk, unproven)
+        return replace(found, predicted=predicted, spread=spread, risk=risk)
+
     def waiting_last(self, book: Logbook) -> Test | None:
-        """The test that waits and flies the tuned gains as they are; the first that waits where no test is the last."""
+        """The test that waits and flies the tuned gains, or the best ones flown, as they are.
+
+        The first that waits where no test is the last.
+        """
         if self.options.tests != "ask" or not self.options.exploit_last:
             return next(iter(book.waiting()), None)
-        return _waiting_last(book, self._gains(book))
+        best = standing.best_flown(book)
+        of_tuned = _waiting_last(book, self._gains(book))
+        return of_tuned if best is None or of_tuned is not None else _waiting_last(book, best.genes)
 
     def _held_back(self, book: Logbook, found: Proposal) -> HoldBack | None:
         """What holds back the excitation of a test of a committee that cannot say where it leads."""
@@ -415,10 +428,10 @@ class IdentifyAndPlan:
         )
 
 
-def _waiting_last(book: Logbook, tuned: Floats) -> Test | None:
-    """The test that is waiting and flies the tuned gains as they are, if there is one: then that one is the last."""
+def _waiting_last(book: Logbook, genes: Floats) -> Test | None:
+    """The test that is waiting and flies some gains as they are, if there is one: then that one is the last."""
     as_they_are = (test for test in book.waiting() if test.excitation is None)
-    return next((test for test in as_they_are if test.genes.tobytes() == tuned.tobytes()), None)
+    return next((test for test in as_they_are if test.genes.tobytes() == genes.tobytes()), None)
 
 
 def _planned(test: Test, found: Proposal) -> Planned:
