@@ -33,9 +33,9 @@ class Candidates:
     @classmethod
     def of_best(cls, judge: Judge, flown: Flown) -> Candidates:
         """The best gains flown alone, without excitation, on the campaign's task."""
-        task, ends = judge.task, (judge.task.initial_state, judge.task.target_state)
-        start, target = (states[np.newaxis] for states in ends)
-        return cls(flown.best[np.newaxis], np.zeros((1, task.steps, judge.signals.n_u)), (start, target), 0)
+        task, calm = judge.task, np.zeros((1, judge.task.steps, judge.signals.n_u))
+        ends = task.initial_state[np.newaxis], task.target_state[np.newaxis]
+        return cls(flown.best[np.newaxis], calm, ends, repeats=0)
 
     def quiet(self) -> Candidates:
         """The same without excitation, all of them on the task of the first."""

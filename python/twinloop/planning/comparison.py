@@ -251,15 +251,16 @@ class Comparison:
 
     def _why(self, chosen: int, safe: bool, disagreement: float) -> Why:
         row, state, high, low = self.where[chosen].tolist()
+        repeats = chosen >= self.drafts.repeats
         return Why(
             trusted=self.committee.trusted,
             flies=self.flown.flies,
             fared=self.flown.fared,
             # Nobody knows where an excitation leads once the last one was too much, and it begins anew.
             stronger=self.committee.trusted or self.flown.borne > 0,
-            exploits=self.wanted.exploit and chosen == 0 < self.drafts.repeats,
+            exploits=self.wanted.exploit and chosen == 0 and not repeats,
             plain=self.wanted.plain,
-            repeats=chosen >= self.drafts.repeats,
+            repeats=repeats,
             safe=safe,
             disagreement=disagreement,
             step=row,
