@@ -179,10 +179,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
         Asking again without a new run learns nothing new and gives another test.
 
         Args:
-            last: whether this is the last test. The preset "default" then flies its best gains without excitation,
-                unless its option `exploit_last` is off or its option `tests` uses no committee. While such a test
-                waits for its run, that one is the last, and another is planned as without `last`. The preset "paper"
-                ignores it.
+            last: whether this is the last test. The preset "default" then flies its best gains without excitation, or
+                the best ones flown if its own promise nothing better and may be far worse, unless its option
+                `exploit_last` is off or its option `tests` uses no committee. While such a test waits for its run, that
+                one is the last, and another is planned as without `last`. The preset "paper" ignores it.
 
         Returns:
             The test, with its predicted quality, its risk and its reason; fly it, then `tell` its run.
@@ -646,7 +646,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def waiting_last(self) -> Test | None:
-        """The waiting test that is the last: it flies the best gains of today without excitation. None: there is none.
+        """The waiting test that is the last: it flies the gains of today's `ask(last=True)`. None: there is none.
 
         All runs are learnt first. Where `ask(last=True)` plans what `ask()` does, it is the first one that waits.
         """

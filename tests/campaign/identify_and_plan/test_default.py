@@ -382,10 +382,15 @@ def test_a_last_experiment_that_would_be_in_vain_flies_the_best_gains_flown_as_t
         test = campaign.ask(last=True)
         assert campaign.waiting_last is test
         assert campaign.ask().number != test.number  # none that is not the last is held against that
+        another = campaign.ask(last=True)  # while one waits, as without `last`
+        assert another.excitation is not None and campaign.waiting_last is test
     assert asked == [(usual.predicted, usual.spread, first.quality)]
     assert same_bits(test.genes, first.test.genes) and not same_bits(usual.genes, test.genes)
     assert test.excitation is None and test.reason == "The best gains flown, again: they are known to fly."
     assert test.predicted != usual.predicted and test.spread > 0.0
+    own = campaign.test(0.8 * first.test.genes)
+    campaign.tell(own, pendulum.run(own))
+    assert campaign.waiting_last is None  # another twin has to plan it anew
 
 
 def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further_than_the_next_flight(

@@ -163,7 +163,7 @@ class IdentifyAndPlan:
                 " neither; fly a controller that you trust: campaign.test(gains), then campaign.tell."
             )
         tuned = self._gains(book)
-        waits = _waiting_last(book, tuned) is not None
+        waits = self._last_of(book, tuned) is not None
         final = last and self.options.exploit_last and not waits
         flown = self._flown(book, best, tuned)
         found = self.planner.propose(
@@ -204,15 +204,26 @@ class IdentifyAndPlan:
         return replace(found, predicted=predicted, spread=spread, risk=risk)
 
     def waiting_last(self, book: Logbook) -> Test | None:
-        """The test that waits and flies the tuned gains, or the best ones flown, as they are.
-
-        The first that waits where no test is the last.
-        """
+        """The waiting test that is the last; the first that waits where `ask` plans none as the last."""
         if self.options.tests != "ask" or not self.options.exploit_last:
             return next(iter(book.waiting()), None)
-        best = standing.best_flown(book)
-        of_tuned = _waiting_last(book, self._gains(book))
-        return of_tuned if best is None or of_tuned is not None else _waiting_last(book, best.genes)
+        return self._last_of(book, self._gains(book))
+
+    def _last_of(self, book: Logbook, tuned: Floats) -> Test | None:
+        """The test that is waiting and flies the tuned gains as they are, if there is one: then that one is the last.
+
+        So is one of the best gains flown, if the twin of today has planned it.
+        """
+        best, now = standing.best_flown(book), self.iteration
+        planned = {entry.test for iteration, entry in book.asked if iteration == now}
+
+        def is_last(test: Test) -> bool:
+            again = (
+                best is not None and test.number in planned and test.genes.tobytes() == best.genes.tobytes()
+            )
+            return test.excitation is None and (again or test.genes.tobytes() == tuned.tobytes())
+
+        return next(filter(is_last, book.waiting()), None)
 
     def _held_back(self, book: Logbook, found: Proposal) -> HoldBack | None:
         """What holds back the excitation of a test of a committee that cannot say where it leads."""
@@ -426,12 +437,6 @@ class IdentifyAndPlan:
                 evaluations=0,
             )
         )
-
-
-def _waiting_last(book: Logbook, genes: Floats) -> Test | None:
-    """The test that is waiting and flies some gains as they are, if there is one: then that one is the last."""
-    as_they_are = (test for test in book.waiting() if test.excitation is None)
-    return next((test for test in as_they_are if test.genes.tobytes() == genes.tobytes()), None)
 
 
 def _planned(test: Test, found: Proposal) -> Planned:
