@@ -556,7 +556,7 @@ def test_gains_that_fly_again_are_excited_more_each_time_up_to_a_limit():
     # What taught no law, and is held back in flight, begins where the one before ended, and grows.
     flown, first = Flown(TUNED, True, [1.0], 1.0), []
     for options in (planner.options, replace(planner.options, hold_back=False)):
-        drafts = drawn(planner, options, TUNED, flown, "both", 3, trusted=False)
+        drafts = drawn(planner, options, TUNED, flown, "both", 3, leads=False)
         first.append(float(np.abs(drafts.excitation[drafts.repeats :]).max()))
     assert first == pytest.approx([planner.options.excitation_unknown, 0.02], rel=0.05)
 

@@ -55,7 +55,7 @@ def candidates(
     flown: Flown,
     goal: str,
     number: int,
-    trusted: bool = True,
+    leads: bool = True,
 ) -> Candidates:
     """Draws candidates; the first one is the tuned gains as they are.
 
@@ -66,7 +66,7 @@ def candidates(
         flown: so far.
         goal: "both", "model" or "control".
         number: of the test, for its streams.
-        trusted: whether the committee is; otherwise the test is held back as a first one is.
+        leads: whether the committee can say where a flight leads; otherwise it is held back as a first one is.
 
     Returns:
         The candidates.
@@ -97,7 +97,7 @@ def candidates(
     if most > 0.0 and options.excitation > 0.0:
         # Gains that have flown bear more of it than before, and once more the same would tell little.
         stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
-        along = directions_of(judge, flown.best) if options.hold_back and not trusted else None
+        along = directions_of(judge, flown.best) if options.hold_back and not leads else None
         for i in range(1, count):
             repeated = i >= count - again
             if repeated and along is not None:

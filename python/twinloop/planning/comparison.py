@@ -77,7 +77,7 @@ class Comparison:
 
     def proposal(self) -> Proposal:
         """The candidate that tells most of those that may be flown, or promises most; else the safest one."""
-        found = self._trusted_choice() if self.committee.trusted else None
+        found = self._trusted_choice() if self.committee.leads else None
         chosen, flights = self._safest() if found is None else found
         inside = self.quiet.worst_usage[chosen] <= 1.0 - self.options.margin
         safe = bool(inside and not outside(flights.usages).any())
@@ -254,10 +254,11 @@ class Comparison:
         repeats = chosen >= self.drafts.repeats
         return Why(
             trusted=self.committee.trusted,
+            gains_count=self.committee.gains_count,
             flies=self.flown.flies,
             fared=self.flown.fared,
             # Nobody knows where an excitation leads once the last one was too much, and it begins anew.
-            stronger=self.committee.trusted or self.flown.borne > 0,
+            stronger=self.committee.leads or self.flown.borne > 0,
             exploits=self.wanted.exploit and chosen == 0 and not repeats,
             plain=self.wanted.plain,
             repeats=repeats,

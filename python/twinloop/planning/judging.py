@@ -50,6 +50,7 @@ class Committee:
         gusts: disturbances that are known; None: nothing disturbs.
         foretells: whether what it foretold last came true.
         ending: the best one where what states do ends where flights have been; None where that is not asked.
+        gains_count: whether gains make a difference on the members.
     """
 
     members: Sequence[_core.Model]
@@ -61,6 +62,12 @@ class Committee:
     tuned_delayed: Sequence[_core.Model] = ()
     foretells: bool = False
     ending: _core.Model | None = None
+    gains_count: bool = True
+
+    @property
+    def leads(self) -> bool:
+        """Whether it can say where a flight leads: the best one follows the runs, and gains make a difference."""
+        return self.trusted and self.gains_count
 
     @property
     def predicts_limits(self) -> bool:
@@ -68,7 +75,7 @@ class Committee:
 
         Of a model that does not explain the runs, the gains that are best within limits are best because of its errors.
         """
-        return self.trusted and self.explains
+        return self.leads and self.explains
 
     def disturbances(self, draws: int, steps: int) -> Floats | None:
         """Draws of known disturbances (draws, n, n_x), the same for all candidates; None where nothing disturbs.

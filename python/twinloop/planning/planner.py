@@ -245,7 +245,7 @@ class Planner(Judge):
 
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""
-        drafts = candidates(self, self.options, genes, flown, wanted.goal, wanted.number, committee.trusted)
+        drafts = candidates(self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads)
         drafts = drafts.quiet() if wanted.plain else drafts
         return Comparison(self, self.options, committee, drafts, flown, wanted)
 

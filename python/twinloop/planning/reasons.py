@@ -17,6 +17,7 @@ class Why:
 
     Args:
         trusted: whether the committee follows the flights so far.
+        gains_count: whether gains make a difference on it.
         flies: whether the best gains flown are known to fly.
         fared: how their flights have ended.
         stronger: whether they fly with a stronger excitation than before.
@@ -31,6 +32,7 @@ class Why:
     """
 
     trusted: bool
+    gains_count: bool
     flies: bool
     fared: Fared
     stronger: bool
@@ -80,6 +82,8 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     high, low = why.members
     if not why.trusted:
         return "The twin does not follow the flights so far: it cannot say what this one will show."
+    if not why.gains_count:
+        return "The twin does not know yet what the commands do to the task: it flies alike with any gains."
     if why.exploits:
         return "The best gains found on the twin, without excitation."
     if why.plain:

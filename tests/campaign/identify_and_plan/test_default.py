@@ -393,6 +393,18 @@ def test_a_last_experiment_that_would_be_in_vain_flies_the_best_gains_flown_as_t
     assert campaign.waiting_last is None  # another twin has to plan it anew
 
 
+def test_where_gains_make_no_difference_on_the_twin_the_best_ones_fly_again_held_back(begin, pendulum):
+    """A law may let a state stand still that moves: no flight on such a twin tells one controller from another."""
+    with mock.patch.object(method_of_default, "gains_count", return_value=False):
+        campaign = told(begin(), pendulum)
+        first, test = campaign.experiments[0].test, campaign.ask()
+    assert same_bits(test.genes, first.genes) and test.hold_back is not None
+    # It goes on from where the first excitation ended.
+    assert np.abs(test.excitation).max() > 1.5 * np.abs(first.excitation).max()
+    assert "does not know yet what the commands do" in test.reason
+    assert told(begin(), pendulum).ask().hold_back is None
+
+
 def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further_than_the_next_flight(
     begin, pendulum
 ):

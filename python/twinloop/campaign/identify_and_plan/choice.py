@@ -144,7 +144,7 @@ class Choice:
             )
         if flown is not None and self.misses and self._tuned_have_flown():
             return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
-        if self._no_gains_count(members, judged):
+        if not self.committee.gains_count:
             return "the gains have no effect on the twin, since no command acts in it"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
@@ -165,15 +165,6 @@ class Choice:
         return any(
             test is not None and test.predicted is not None and quality is not None
             for test, quality in flights
-        )
-
-    def _no_gains_count(self, members: Sequence[_core.Model], judged: Judged) -> bool:
-        """Whether every member flies to the bit as well in two corners of the gains' box as with the tuned ones."""
-        family = self.planner.family
-        corners = np.stack([family.from_unit(np.full(family.size, place)) for place in (0.0, 1.0)])
-        qualities = judged.qualities[:, :, :1]
-        return bool(
-            np.isfinite(qualities).all() and (self._judge(members, corners).qualities == qualities).all()
         )
 
     def _not_preferred(self, recorded: Floats, tuned: Floats, flown: Test, better: float) -> str:

@@ -34,6 +34,7 @@ from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
 from twinloop.law.ending import ending
+from twinloop.planning.effect import gains_count
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -187,7 +188,7 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
-            hold_back=None if committee.trusted else self._held_back(book, found),
+            hold_back=None if committee.leads else self._held_back(book, found),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
@@ -368,6 +369,7 @@ class IdentifyAndPlan:
             slower(TUNED_WITH) if true else borne,
             latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
             self._ending(latest, book),
+            gains_count(self.planner, latest.believed),
         )
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
@@ -395,14 +397,14 @@ class IdentifyAndPlan:
         return gusts
 
     def _gains(self, book: Logbook) -> Floats:
-        """Gains tuned on the committee; the best ones flown where no model can be trusted."""
+        """Gains tuned on the committee; the best ones flown where that cannot say where they lead."""
         experiments = len(book.experiments)
         if self.memory.gains is not None and self.memory.gains[0] == book.outcomes:
             return self.memory.gains[1]
         committee, asked = self._committee(book), self.memory.asked
         starts = starts_of(self.setup, book, committee, None if asked is None else asked.gains)
         genes = starts[0]
-        if committee.trusted:
+        if committee.leads:
             genes = self.planner.tune(committee, starts, experiments, self._scored(book))
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
         if self._latest().experiments == experiments:
