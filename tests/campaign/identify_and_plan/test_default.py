@@ -16,6 +16,7 @@ from twinloop.campaign import controller_to_fly, standing
 from twinloop.campaign.entering import check_first_reading
 from twinloop.campaign.identify_and_plan import learning
 from twinloop.campaign.identify_and_plan import method as method_of_default
+from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.faces.result import summary
 from twinloop.law.actuation import Actuation
 from twinloop.law.noise import Noise
@@ -391,6 +392,15 @@ def test_a_last_experiment_that_would_be_in_vain_flies_the_best_gains_flown_as_t
     own = campaign.test(0.8 * first.test.genes)
     campaign.tell(own, pendulum.run(own))
     assert campaign.waiting_last is None  # another twin has to plan it anew
+
+
+@pytest.mark.parametrize(("misses", "share"), [(False, 0.15), (True, 0.35)])
+def test_the_first_prediction_of_a_twin_that_misses_its_own_flight_has_the_spread_of_such(
+    begin, pendulum, misses, share
+):
+    with mock.patch.object(Learnt, "misses", new_callable=mock.PropertyMock, return_value=misses):
+        test = told(begin(), pendulum).ask()
+    assert test.spread == pytest.approx(share * test.predicted)
 
 
 def test_where_gains_make_no_difference_on_the_twin_the_best_ones_fly_again_held_back(begin, pendulum):

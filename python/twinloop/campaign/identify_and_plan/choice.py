@@ -261,7 +261,7 @@ class Choice:
     def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
         predicted, spread = self._moved(test.genes).added_to(*expected(recorded))
-        return predicted, calibrated(spread, predicted, self.book.experiments)
+        return predicted, calibrated(spread, predicted, self.book.experiments, not self.misses)
 
     def _moved(self, genes: Floats) -> Moved:
         """What known disturbances do to the task's flight with some gains (size,), without excitation."""
