@@ -39,10 +39,10 @@ def test_before_any_prediction_was_flown_a_spread_is_what_second_flights_miss_by
     assert held_to(3.0, calibrated(1e-6, 3.0, [])) == pytest.approx(0.04 * 3.0)
     assert held_to(3.0, calibrated(9.0, 3.0, [])) == 9.0
     # A twin that misses the flight that it was learnt from misses the next one by more, and that is no merit either.
-    unexplained = calibrated(1e-6, 3.0, [], explains=False)
-    assert unexplained == pytest.approx(0.35 * 3.0) and held_to(3.0, unexplained) == pytest.approx(0.04 * 3.0)
+    missing = calibrated(1e-6, 3.0, [], misses_own=True)
+    assert missing == pytest.approx(0.35 * 3.0) and held_to(3.0, missing) == pytest.approx(0.04 * 3.0)
     missed = [flight(1.1, 1.0)]
-    assert calibrated(1e-6, 3.0, missed, explains=False) == calibrated(1e-6, 3.0, missed)
+    assert calibrated(1e-6, 3.0, missed, misses_own=True) == calibrated(1e-6, 3.0, missed)
     assert held_to(3.0, calibrated(1e-6, 3.0, missed)) == calibrated(1e-6, 3.0, missed)
 
 

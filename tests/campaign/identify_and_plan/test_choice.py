@@ -37,7 +37,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
-    misses=False, fared=KEPT, in_gusts=None, delayed=None, blown_about=None,
+    misses=False, fared=KEPT, in_gusts=None, delayed=None, blown_about=None, gains_count=True,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -70,7 +70,7 @@ def chosen(
     )  # fmt: skip
     blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
     late = [] if delayed is None else ["delayed"]
-    committee = Committee([None], np.zeros(2), trusted, late, explained, blown)
+    committee = Committee([None], np.zeros(2), trusted, late, explained, blown, gains_count=gains_count)
     choice = Choice(planner, committee, book, 4, confidence, misses)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
@@ -85,6 +85,12 @@ def chosen(
         max(0.5 / 5.0, moved.risk, fared.risk if (found.genes == FLOWN.genes).all() else 0.0)
     )
     return ("tuned" if (found.genes == TUNED).all() else "flown"), told[0] if gusts is UNMOVED else told
+
+
+def test_gains_that_make_no_difference_on_the_twin_are_not_recommended():
+    answer, reason = chosen(0.5, gains_count=False)
+    assert answer == "flown" and "does not know yet what the commands do" in reason
+    assert chosen(0.5)[0] == "tuned"
 
 
 def test_gains_of_a_twin_that_misses_its_flights_fly_before_they_are_recommended():

@@ -32,7 +32,7 @@ FIRST_SPREAD = 0.15
 """Smallest spread of a quality, as a share of it, before any prediction was flown. First flights show little of a law:
 on the zoo's half that is tuned on, 11 of 12 second flights were within twice that of their predictions, 10 within a
 fifth, and beside spreads of the committee alone, 4 % in the median, one was off by 147 of them."""
-UNEXPLAINED_SPREAD = 0.35
+SPREAD_OF_MISSING = 0.35
 """The same where the twin misses the flight that it was learnt from: of 25 second flights of gains that had not flown,
 on the zoo and on machines outside it, 17 were within that and 22 within twice that; with 0.15 it were 13 and 17."""
 OF_A_MISS = 2.0
@@ -77,7 +77,7 @@ def factor(needed: Sequence[float]) -> float:
 
 
 def calibrated(
-    spread: float, predicted: float, flights: Iterable[Experiment], explains: bool = True
+    spread: float, predicted: float, flights: Iterable[Experiment], misses_own: bool = False
 ) -> float:
     """Spread of a predicted quality, no smaller than what earlier predictions missed by, their bias included.
 
@@ -85,7 +85,7 @@ def calibrated(
         spread: standard deviation over members and noise.
         predicted: the quality.
         flights: recorded so far, with the predictions that they were flown on.
-        explains: whether the twin misses none of the flights that it was learnt from.
+        misses_own: whether the twin misses flights that it was learnt from.
 
     Returns:
         The standard deviation of the prediction; `spread` where the prediction is infinite.
@@ -93,7 +93,7 @@ def calibrated(
     if not isfinite(predicted):
         return spread
     known = misses(flights)
-    first = FIRST_SPREAD if explains else UNEXPLAINED_SPREAD
+    first = SPREAD_OF_MISSING if misses_own else FIRST_SPREAD
     share = OF_A_MISS * of_late(known) if known else first
     return max(spread, share * abs(predicted))
 
@@ -105,7 +105,7 @@ def held_to(predicted: float, spread: float) -> float:
         predicted: the quality.
         spread: that was said of it.
     """
-    assumed = spread in (FIRST_SPREAD * abs(predicted), UNEXPLAINED_SPREAD * abs(predicted))
+    assumed = spread in (FIRST_SPREAD * abs(predicted), SPREAD_OF_MISSING * abs(predicted))
     return OF_A_MISS * FIRST_MISS * abs(predicted) if assumed else spread
 
 

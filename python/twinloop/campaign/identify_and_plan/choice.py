@@ -145,7 +145,7 @@ class Choice:
         if flown is not None and self.misses and self._tuned_have_flown():
             return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
         if not self.committee.gains_count:
-            return "the gains have no effect on the twin, since no command acts in it"
+            return "the gains have no effect on the twin, which does not know yet what the commands do to the task"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
@@ -261,7 +261,7 @@ class Choice:
     def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
         predicted, spread = self._moved(test.genes).added_to(*expected(recorded))
-        return predicted, calibrated(spread, predicted, self.book.experiments, not self.misses)
+        return predicted, calibrated(spread, predicted, self.book.experiments, self.misses)
 
     def _moved(self, genes: Floats) -> Moved:
         """What known disturbances do to the task's flight with some gains (size,), without excitation."""

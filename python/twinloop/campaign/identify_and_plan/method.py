@@ -198,7 +198,7 @@ class IdentifyAndPlan:
         """A proposal with what known disturbances and the record of earlier predictions make of it."""
         gusts = committee.moved_by_gusts(self._as_test(book, found))
         predicted, spread = gusts.added_to(found.predicted, found.spread)
-        spread = calibrated(spread, predicted, book.experiments, not self._latest().misses)
+        spread = calibrated(spread, predicted, book.experiments, self._latest().misses)
         own = standing.fared(book, found.genes, found.excitation is not None)
         unproven = unproven_risk(book.experiments, own, self.setup.signals, committee.explains)
         risk = max(found.risk, own.risk, gusts.risk, unproven)
