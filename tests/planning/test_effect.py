@@ -1,14 +1,18 @@
-"""Whether gains make a difference on a twin at all, and what is flown where they make none."""
+"""Whether gains make a difference on a twin at all, which answer to a state, and what is flown where not all count."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import twinloop as tl
 from committees import TUNED, committee_of, member, planner_of, signals
 from oracles import same_bits
-from twinloop.planning.effect import gains_count
+from twinloop._ground.streams import Unit
+from twinloop.planning.effect import answering, gains_count
+from twinloop.planning.excitation import directions
 from twinloop.planning.proposal import Flown
+from twinloop.planning.within import tune_within
 
 KNOWN = signals()
 IDLE, MOVED, WILD = member(KNOWN, 0.0), member(KNOWN, 1.0), member(KNOWN, 1.0, damping=-400.0)
@@ -39,3 +43,106 @@ def test_where_gains_make_no_difference_the_best_ones_fly_again_as_strongly_exci
     most = planner.options.excitation_unknown
     assert amplitudes[0] == pytest.approx(most, rel=0.05) and amplitudes[2] == pytest.approx(most, rel=0.05)
     assert amplitudes[1] <= planner.options.excitation_most
+
+
+ARM = tl.Signals(
+    [
+        tl.State("a", "rad", 1.0, envelope=(-2.0, 2.0)),
+        tl.State("b", "rad", 1.0),
+        tl.State("p", "rad/s", 3.0, derivative_of="a"),
+        tl.State("q", "rad/s", 3.0, derivative_of="b"),
+    ],
+    [tl.Command("left", "N m", (-9.0, 9.0)), tl.Command("right", "N m", (-9.0, 9.0))],
+    0.02,
+)
+A, B, P, Q = range(4)
+BOX = (0.0, 5.0)
+THREE = {f"{axis}.{kind}": BOX for axis in "ab" for kind in ("kp", "ki", "kd")}
+LAWS = {
+    "pid": tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=THREE),
+    "no-rates": tl.controllers.PID(axes=[("a", None), ("b", None)], gains=THREE),
+    "cascade": tl.controllers.Cascade(
+        axes=[("a", "p"), ("b", "q")],
+        gains={
+            **{f"{axis}.kp": BOX for axis in "ab"},
+            **{f"{rate}.{kind}": BOX for rate in "pq" for kind in ("kp", "ki", "kd")},
+        },
+    ),
+    "feedback": tl.controllers.StateFeedback(
+        states=["a", "b", "q"], gains={name: (-5.0, 5.0) for name in "abq"}
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("law", "states", "names"),
+    [
+        ("pid", [B], "b.kp b.ki"),
+        ("pid", [Q], "b.kd"),
+        ("pid", [B, Q], "b.kp b.ki b.kd"),
+        ("pid", [A, B], "a.kp a.ki b.kp b.ki"),
+        ("pid", [], ""),
+        ("no-rates", [B], "b.kp b.ki b.kd"),
+        ("no-rates", [Q], ""),
+        ("cascade", [B], "b.kp q.kp q.ki"),
+        ("cascade", [Q], "q.kp q.ki q.kd"),
+        ("feedback", [A], "a->left a->right"),
+        ("feedback", [B, Q], "b->left b->right q->left q->right"),
+    ],
+)
+def test_gains_answer_to_a_state_if_what_is_sent_while_it_is_off_depends_on_them(law, states, names):
+    """Over two periods, so that rates that are differences, and integrals, are answered too."""
+    family = LAWS[law].bind(ARM)
+    found = answering(family, states, np.array([0.3, -0.2, 0.0, 0.0]))
+    assert sorted(family.names[i] for i in found) == sorted(names.split())
+
+
+HELD = replace(committee_of(KNOWN), lawless=(0,), held=(1,))
+"""As if the angle's law, and so what its integral is for, were not known."""
+START = np.array([0.6, 0.7, 0.3])
+
+
+def test_gains_that_cannot_be_tuned_stay_as_in_the_first_start_and_the_others_are_the_best_beside_them():
+    planner = planner_of(KNOWN, evaluations=4000, draws=1, delay_margin=False)
+    found, free = (planner.tune(committee, [START, TUNED], 1) for committee in (HELD, committee_of(KNOWN)))
+    assert found[1] == START[1] != free[1]
+    others = planner.family.from_unit(Unit(1).part(1).stream("candidates").uniforms(20_000, 3))
+    others[:, 1] = START[1]
+    judged = planner.judge(HELD.members, np.vstack([found, others]), HELD.sds, 1)
+    kept = judged.worst_usage[1:] <= 1.0 - planner.options.margin
+    assert judged.mean[0] <= 1.01 * judged.mean[1:][kept].min()
+
+
+def test_so_they_do_where_gains_are_tuned_within_limits():
+    bounds = np.array([[-0.9, -0.4], [0.9, 0.4]])
+    found = tune_within(
+        planner_of(KNOWN), planner_of(KNOWN).options, HELD, HELD.members, bounds, [START], 3, lambda: None
+    )
+    assert found[1] == START[1] and not same_bits(found, START)
+
+
+@pytest.mark.parametrize("goal", ["both", "model"])
+def test_a_proposal_keeps_them_as_flown_excites_what_has_no_law_as_a_first_flight_and_says_so(goal):
+    flown = Flown(START, True, [1.0], 100.0)
+    planner = planner_of(KNOWN)
+    tuned = planner.tune(HELD, [START], 1)
+    found = planner.propose(HELD, tuned, flown, goal, 3, exploit=False)
+    assert found.genes[1] == START[1] and not same_bits(found.genes, START)
+    assert "knows no law of angle yet: angle.ki stay as flown" in found.reason
+    usual = planner.propose(committee_of(KNOWN), tuned, flown, goal, 3, exploit=False)
+    assert "stay as flown" not in usual.reason
+    most = planner.options.excitation_most
+    assert np.abs(usual.excitation).max() <= most < np.abs(found.excitation).max()
+    plain = planner.propose(HELD, tuned, flown, goal, 3, exploit=True, last=True)
+    assert plain.excitation is None and plain.genes[1] == START[1]
+
+
+def test_only_along_the_commands_that_answer_to_it():
+    """Two axes with a command each, of which one has a law."""
+    family = LAWS["pid"].bind(ARM)
+    genes = np.full(6, 0.5)
+    vectors, answers = directions(family, genes, np.zeros(4), [B, Q])
+    np.testing.assert_allclose(np.abs(vectors), [[0.0, 1.0]], atol=1e-12)
+    every, all_answers = directions(family, genes, np.zeros(4))
+    assert len(every) == 2 and all_answers.max() >= answers[0] > 0.0
+    assert len(directions(family, genes, np.zeros(4), [])[0]) == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,7 @@ def candidates(
     goal: str,
     number: int,
     leads: bool = True,
+    lawless: Sequence[int] = (),
 ) -> Candidates:
     """Draws candidates; the first one is the tuned gains as they are.
 
@@ -67,6 +69,7 @@ def candidates(
         goal: "both", "model" or "control".
         number: of the test, for its streams.
         leads: whether the committee can say where a flight leads; otherwise it is held back as a first one is.
+        lawless: states of which it knows no law: they are excited as in such a flight.
 
     Returns:
         The candidates.
@@ -98,6 +101,9 @@ def candidates(
         # Gains that have flown bear more of it than before, and once more the same would tell little.
         stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
         along = directions_of(judge, flown.best) if options.hold_back and not leads else None
+        beside = (
+            directions_of(judge, flown.best, lawless) if options.hold_back and leads and lawless else None
+        )
         for i in range(1, count):
             repeated = i >= count - again
             if repeated and along is not None:
@@ -105,6 +111,8 @@ def candidates(
                 continue
             amplitude = stronger if repeated else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)
+            if beside is not None:
+                excitation[i] += unknown_excitation(judge, options, beside, flown.borne, stream)
     return Candidates(genes, excitation, _ends(judge, options, number, count), count - again)
 
 
@@ -124,9 +132,9 @@ def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> En
     return ends[0], ends[1]
 
 
-def directions_of(judge: Judge, genes: Floats) -> tuple[Floats, Floats]:
+def directions_of(judge: Judge, genes: Floats, states: Sequence[int] | None = None) -> tuple[Floats, Floats]:
     """`directions` of the controller with some gains (size,), around the target of the campaign's task."""
-    return directions(judge.family, genes, np.atleast_2d(judge.task.target_state)[0])
+    return directions(judge.family, genes, np.atleast_2d(judge.task.target_state)[0], states)
 
 
 def unknown_excitation(

@@ -267,6 +267,8 @@ class Comparison:
             step=row,
             state=state,
             members=(high, low),
+            lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
+            held=tuple(self.judge.family.names[i] for i in self.committee.held),
         )
 
 

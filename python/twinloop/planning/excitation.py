@@ -5,6 +5,7 @@ While no law is known, the controller says how strongly they begin, and what the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
@@ -91,38 +92,50 @@ def swing_of(duration: float) -> float:
     return duration / (2.0 * np.pi * FIRST[0])
 
 
-def directions(family: Family, genes: Floats, target: Floats) -> tuple[Floats, Floats]:
+def directions(
+    family: Family, genes: Floats, target: Floats, states: Sequence[int] | None = None
+) -> tuple[Floats, Floats]:
     """Directions in command space, and what a controller at rest sends along them.
 
     Args:
         family: of the controllers.
         genes: of one of them (size,).
         target: around which it is asked (n_x,).
+        states: that are off; None: all, with the directions that the controller has no use for.
 
     Returns:
-        Unit vectors, a row each, in scales of the commands (n_u, n_u). For each, what is sent at most for states that
-        are off by their envelopes (by the scale, where a state has none), all together as one unit vector (n_u,): the
-        singular values; 0 where the controller has no use for a direction.
+        Unit vectors, a row each, in scales of the commands (n_u, n_u), fewer for some states. For each, what is sent at
+        most for states that are off by their envelopes (by the scale, where a state has none), all together as one unit
+        vector (n_u,): the singular values; 0 where the controller has no use for a direction.
     """
     sent = slopes(family, genes, target)
+    if states is not None:
+        sent = sent[:, list(states)]
     values, vectors = _core.eigen((sent[:, np.newaxis, :] * sent[np.newaxis, :, :]).sum(axis=2))
     used = values > UNUSED * values[-1] if values[-1] > 0.0 else np.zeros(len(values), bool)
-    return vectors, np.sqrt(np.where(used, values, 0.0))
+    answers = np.sqrt(np.where(used, values, 0.0))
+    return (vectors, answers) if states is None else (vectors[used], answers[used])
 
 
 def slopes(family: Family, genes: Floats, target: Floats) -> Floats:
     """What a controller at rest sends for an error (n_u, n_x), in scales of the commands for shares of the envelope."""
     columns = []
     scales = np.array([command.size for command in family.signals.commands])
-    for i, state in enumerate(family.signals.states):
-        half = state.scale if state.envelope is None else 0.5 * (state.envelope[1] - state.envelope[0])
-        answers = []
-        for sign in (1.0, -1.0):
-            reading = target.copy()
-            reading[i] += sign * NEARBY * half
-            answers.append(family.controller(genes).command(reading, target))
+    for i in range(family.signals.n_x):
+        answers = [
+            family.controller(genes).command(off_by(family.signals, i, target, share), target)
+            for share in (NEARBY, -NEARBY)
+        ]
         columns.append((answers[0] - answers[1]) / (2.0 * NEARBY * scales))
     return np.stack(columns, axis=1)
+
+
+def off_by(signals: Signals, place: int, target: Floats, share: float = NEARBY) -> Floats:
+    """A target (n_x,) from which one state is off by a share of half its envelope, of its scale where it has none."""
+    state, reading = signals.states[place], target.copy()
+    half = state.scale if state.envelope is None else 0.5 * (state.envelope[1] - state.envelope[0])
+    reading[place] += share * half
+    return reading
 
 
 def chirps(signals: Signals, steps: int, amplitude: float, fade: float, stream: _core.Stream) -> Floats:

@@ -51,6 +51,8 @@ class Committee:
         foretells: whether what it foretold last came true.
         ending: the best one where what states do ends where flights have been; None where that is not asked.
         gains_count: whether gains make a difference on the members.
+        lawless: states that move, of which no law is known.
+        held: numbers of the gains that answer to those, and cannot be tuned on the members.
     """
 
     members: Sequence[_core.Model]
@@ -63,6 +65,8 @@ class Committee:
     foretells: bool = False
     ending: _core.Model | None = None
     gains_count: bool = True
+    lawless: tuple[int, ...] = ()
+    held: tuple[int, ...] = ()
 
     @property
     def leads(self) -> bool:
@@ -76,6 +80,12 @@ class Committee:
         Of a model that does not explain the runs, the gains that are best within limits are best because of its errors.
         """
         return self.leads and self.explains
+
+    def as_flown(self, genes: Floats, flown: Floats) -> Floats:
+        """Genes (..., size) whose gains that cannot be tuned are those of flown ones (size,)."""
+        kept = genes.copy()
+        kept[..., list(self.held)] = flown[list(self.held)]
+        return kept
 
     def disturbances(self, draws: int, steps: int) -> Floats | None:
         """Draws of known disturbances (draws, n, n_x), the same for all candidates; None where nothing disturbs.

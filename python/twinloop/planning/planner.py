@@ -86,7 +86,7 @@ class Planner(Judge):
 
         Args:
             committee: that judges.
-            starts: genes to start from.
+            starts: genes to start from; gains that cannot be tuned stay as in the first.
             number: of runs, for its streams.
             scored: what was judged of the same before it was cut, and who keeps what is judged; None: it begins.
         """
@@ -103,11 +103,12 @@ class Planner(Judge):
         first = [*committee.members[:1], *delayed]
         members = [*committee.members[: max(1, options.tuning_members - len(delayed))], *delayed]
         known = all_starts[0]
+        all_starts = [committee.as_flown(start, known) for start in all_starts]
         coarse = scored(self._score(committee, first, 1, known))
-        best = self._searched(coarse, all_starts, number, COARSE)
+        best = committee.as_flown(self._searched(coarse, all_starts, number, COARSE), known)
         # Noise and other members may rank basins anew, so what was known is refined, too.
         fine = scored(self._score(committee, members, options.draws, known))
-        return self._searched(fine, [best, known], number, FINE)
+        return committee.as_flown(self._searched(fine, [best, known], number, FINE), known)
 
     def _searched(self, score: Score, starts: Sequence[Floats], number: int, search: Search) -> Floats:
         """One of two searches, with half of the evaluations."""
@@ -130,7 +131,8 @@ class Planner(Judge):
         first = float(self.judge(members, known[np.newaxis], sds, draws, disturbances=met).mean[0])
         unit = first if np.isfinite(first) else 0.0
 
-        def score(genes: Floats) -> Floats:
+        def score(places: Floats) -> Floats:
+            genes = committee.as_flown(places, known)
             judged = self.judge(members, genes, sds, draws, disturbances=met)
             lost, usage = judged.lost, judged.finite.worst_usage
             if limiting:
@@ -245,7 +247,10 @@ class Planner(Judge):
 
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""
-        drafts = candidates(self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads)
+        drafts = candidates(
+            self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads, committee.lawless
+        )
+        drafts = replace(drafts, genes=committee.as_flown(drafts.genes, flown.best))
         drafts = drafts.quiet() if wanted.plain else drafts
         return Comparison(self, self.options, committee, drafts, flown, wanted)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop._ground.elementary import log
-from twinloop._ground.texts import two_digits
+from twinloop._ground.texts import enumerated, two_digits
 from twinloop.planning.proposal import Fared
 from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
@@ -29,6 +29,8 @@ class Why:
         step: at which two members are the furthest apart.
         state: in which they are.
         members: numbers of the two.
+        lawless: names of states of which no law is known.
+        held: names of the gains that answer to those.
     """
 
     trusted: bool
@@ -44,6 +46,8 @@ class Why:
     step: int
     state: int
     members: tuple[int, int]
+    lawless: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
 
 def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
@@ -54,7 +58,7 @@ def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
         signals: of the system.
         options: of the planning.
     """
-    sentences = [_what_flies(why, options), _what_it_tells(why, signals)]
+    sentences = [_what_flies(why, options), _what_it_tells(why, signals), _what_stays(why)]
     if not why.safe:
         sentences.append(
             "No candidate completes the flight within the envelope and its margin on every"
@@ -96,3 +100,10 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
             f" {why.disagreement / float(log(2.0)):.3g} bits."
         )
     return "The models agree on it: the flight tests what they have in common."
+
+
+def _what_stays(why: Why) -> str:
+    """Which gains are not tuned, where others are."""
+    if not why.held or why.repeats or not (why.trusted and why.gains_count):
+        return ""
+    return f"The twin knows no law of {enumerated(why.lawless)} yet: {enumerated(why.held)} stay as flown."

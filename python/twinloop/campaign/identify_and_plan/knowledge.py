@@ -15,7 +15,6 @@ from twinloop.campaign.identify_and_plan.calibration import (
     residuals_of_flights,
 )
 from twinloop.campaign.identify_and_plan.causes import observed
-from twinloop.campaign.identify_and_plan.inside import inside
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.setup import Setup
@@ -118,8 +117,7 @@ class Knowledge:
         learnt = self.learnt
         if learnt.identified.exact:
             return None
-        told, limits = self.book.experiments[: learnt.experiments], self.setup.limits
-        flights = inside(told) if learnt.inside else told
+        flights, limits = learnt.flights(self.book.experiments), self.setup.limits
         found = observed(learnt.identified, flights, self.setup.signals, limits, workers)
         return None if found is None else tuple(errors for errors, _, _ in found)
 

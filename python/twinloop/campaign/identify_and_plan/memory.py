@@ -8,8 +8,8 @@ from typing import ClassVar
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero
-from twinloop.campaign.history import Lesson
-from twinloop.campaign.identify_and_plan.inside import INSIDE
+from twinloop.campaign.history import Experiment, Lesson
+from twinloop.campaign.identify_and_plan.inside import INSIDE, inside
 from twinloop.campaign.identify_and_plan.misses import FREE_RUN
 from twinloop.campaign.identify_and_plan.two_laws import TwoLaws
 from twinloop.identification.identified import Identified
@@ -90,6 +90,15 @@ class Learnt(Recorded, kind="learnt"):
     def inside(self) -> bool:
         """Whether flights were learnt only as far as they were inside their envelope."""
         return any(remark.code == INSIDE for remark in self.lessons[-1].remarks)
+
+    def flights(self, experiments: Sequence[Experiment]) -> Sequence[Experiment]:
+        """Of experiments those that were learnt, as far as they were.
+
+        Args:
+            experiments: as they were told.
+        """
+        told = experiments[: self.experiments]
+        return inside(told) if self.inside else told
 
     @property
     def misses(self) -> bool:

@@ -26,6 +26,7 @@ from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
 from twinloop.campaign.identify_and_plan.starts import first_genes, known_gains, starts_of
 from twinloop.campaign.identify_and_plan.track_record import nearly_confirmed_in_a_row, unproven_risk
+from twinloop.campaign.identify_and_plan.unmoved import lawless_states
 from twinloop.campaign.identify_and_plan.wrong_readings import without_wrong_readings
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
@@ -34,7 +35,7 @@ from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
 from twinloop.law.ending import ending
-from twinloop.planning.effect import gains_count
+from twinloop.planning.effect import answering, gains_count
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -188,7 +189,7 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
-            hold_back=None if committee.leads else self._held_back(book, found),
+            hold_back=None if committee.leads and not committee.lawless else self._held_back(book, found),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
@@ -359,6 +360,9 @@ class IdentifyAndPlan:
             return [delayed(latest.believed[0], self.setup.signals, share**true)] if wanted else []
 
         borne = slower(TOLERATED)
+        flights = without_wrong_readings(latest.flights(book.experiments), self.setup.signals)
+        lawless = lawless_states(latest.identified, flights, self.setup)
+        held = answering(self.setup.family, lawless, np.atleast_2d(self.setup.target_state)[0])
         return Committee(
             latest.believed,
             sensors,
@@ -369,7 +373,9 @@ class IdentifyAndPlan:
             slower(TUNED_WITH) if true else borne,
             latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
             self._ending(latest, book),
-            gains_count(self.planner, latest.believed),
+            len(held) < self.setup.family.size and gains_count(self.planner, latest.believed),
+            lawless,
+            held,
         )
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:

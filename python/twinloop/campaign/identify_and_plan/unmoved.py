@@ -49,6 +49,33 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
     ]
 
 
+def lawless_states(
+    identified: Identified, experiments: Sequence[Experiment], setup: Setup
+) -> tuple[int, ...]:
+    """Such states, their integrals, and the angles that they turn.
+
+    Args:
+        identified: with the model.
+        experiments: that it was learnt from.
+        setup: of the campaign.
+    """
+    unmoved = unmoved_states(identified, experiments, setup)
+    chains = (found.chain.states for found in identified.sums if found.chain.states[0] in unmoved)
+    return tuple(sorted({state for chain in chains for state in chain} | _turned(unmoved, setup.signals)))
+
+
+def _turned(rates: Sequence[int], signals: Signals) -> set[int]:
+    """Angles of a rigid body that turn with some of its rates, about the same axes."""
+    body, names = signals.kinematics, signals.state_names
+    if body is None:
+        return set()
+    return {
+        names.index(angle)
+        for angle, rate in zip(body.angles, body.rates, strict=True)
+        if names.index(rate) in rates
+    }
+
+
 def _at_most(runs: Sequence[Run], signals: Signals) -> Floats:
     """Largest standard deviation of each sensor (n_x,): what seems more than readings scatter is motion."""
     guess: Floats = np.sqrt(guessed_noise(runs, np.array([state.scale for state in signals.states])))
