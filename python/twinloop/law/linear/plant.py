@@ -46,12 +46,21 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
     point = np.concatenate([state, factors * command, settled_as_seen(law, state)])
     found = as_given(law.reports, as_read(law, plain, _wrapped(law, point)), law.signals.dt)
-    if not (np.isfinite(found.A).all() and np.isfinite(found.B).all() and np.isfinite(found.drift).all()):
-        raise NotAvailable(
-            "Linearisation: expected a law with finite derivatives at the point, found one that overflows or has a"
-            " root of 0 there; choose a point beside it."
-        )
+    if not _finite(found):
+        raise _no_derivatives()
     return found
+
+
+def _finite(plant: Linear) -> bool:
+    parts = (plant.A, plant.B, plant.drift)
+    return all(bool(np.isfinite(part).all()) for part in parts)
+
+
+def _no_derivatives() -> NotAvailable:
+    return NotAvailable(
+        "Linearisation: expected a law with finite derivatives at the point, found one that overflows or has a root of"
+        " 0 there; choose a point beside it."
+    )
 
 
 def _instant(law: Law, state: Floats, command: Floats) -> Linear:
@@ -324,6 +333,9 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
 
     Returns:
         The command (n_u,), within its bounds.
+
+    Raises:
+        NotAvailable: the law has no derivatives there.
     """
     # A command that is held has arrived.
     at_once = replace(law, actuation=Actuation((Actuator(),) * law.signals.n_u, law.actuation.hidden))
@@ -333,10 +345,14 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
 
     def off(command: Floats) -> tuple[float, Linear]:
         found = _period(at_once, state, command)
+        if not _finite(found):
+            return np.inf, found
         return float(np.square(found.drift[: law.signals.n_x] / scales).sum()), found
 
     best = np.clip(start, low, high)
     least, found = off(best)
+    if least == np.inf:
+        raise _no_derivatives()
     for _ in range(HALVINGS):
         n_x = law.signals.n_x
         reach = found.B[:n_x] * sizes / scales[:, np.newaxis]
