@@ -310,3 +310,17 @@ def test_a_mode_that_the_controller_does_not_know_is_not_driven_far():
     alone = used(True, None)
     assert max(used(False, seed=seed) for seed in range(6)) > 1.5 * alone
     assert max(used(True, seed=seed) for seed in range(6)) < 1.2 * alone
+
+
+def test_only_some_states_may_count():
+    start, target = np.zeros(SIGNALS.n_x), np.zeros(SIGNALS.n_x)
+    every = HoldBack.between(SIGNALS, start, target)
+    for place in range(SIGNALS.n_x):
+        one = HoldBack.between(SIGNALS, start, target, by=[place])
+        others = [i for i in range(SIGNALS.n_x) if i != place]
+        if not np.isfinite(every.none[place]).any():
+            assert one is None
+            continue
+        assert same_bits(one.none[place], every.none[place]) and same_bits(one.full[place], every.full[place])
+        assert np.isinf(one.none[others]).all() and np.isinf(one.full[others]).all()
+    assert HoldBack.between(SIGNALS, start, target, by=[]) is None

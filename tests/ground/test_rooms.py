@@ -59,7 +59,9 @@ FRONTS = {
     "law/exports": "environment export gymnasium_source taking",
     "law/exports/fmu": "running unit",
     "law/linear": "friction margins plant state_space storage",
-    "planning": "effect excitation failed gusts judging leaving planner proposal quality scored seen settings worth",
+    "planning": (
+        "effect excitation failed gusts judging leaving planner proposal quality reasons scored seen settings worth"
+    ),
     "records": "reading",
     "reproduce": "command",
     "store": "uninterrupted",

@@ -10,7 +10,7 @@ from committees import TUNED, committee_of, member, planner_of, signals
 from oracles import same_bits
 from twinloop._ground.streams import Unit
 from twinloop.planning.effect import answering, gains_count
-from twinloop.planning.excitation import directions
+from twinloop.planning.excitation import directions, directions_for, growing_chirps, slopes
 from twinloop.planning.proposal import Flown
 from twinloop.planning.within import tune_within
 
@@ -97,7 +97,76 @@ def test_gains_answer_to_a_state_if_what_is_sent_while_it_is_off_depends_on_them
     assert sorted(family.names[i] for i in found) == sorted(names.split())
 
 
-HELD = replace(committee_of(KNOWN), lawless=(0,), held=(1,))
+def large(law, most):
+    """The names of the gains that answer to b where they may be as large as this."""
+    box = (0.0, most)
+    gains = {name: box for name in THREE}
+    if law == "cascade":
+        gains = {f"{axis}.kp": box for axis in "ab"} | {
+            f"{rate}.{kind}": box for rate in "pq" for kind in ("kp", "ki", "kd")
+        }
+        family = tl.controllers.Cascade(axes=[("a", "p"), ("b", "q")], gains=gains)
+    else:
+        family = tl.controllers.PID(axes=[("a", law), ("b", law and "q")], gains=gains)
+    family = family.bind(ARM)
+    return [family.names[i] for i in answering(family, [B], np.zeros(4))]
+
+
+@pytest.mark.parametrize("most", [1e-3, 1.0, 1e2, 1e4])
+def test_gains_that_saturate_their_command_answer_too(most):
+    """Commands are within ±9; with 1e4 a ten-thousandth of a radian asks for more."""
+    assert large("p", most) == ["b.kp", "b.ki"]
+    assert large(None, most) == ["b.kp", "b.ki", "b.kd"]
+    assert large("cascade", most) == ["b.kp", "q.kp", "q.ki"]
+
+
+class Trimmed:
+    """A law in Python: a trim that is always sent, and a gain for each axis."""
+
+    def __init__(self, **gains):
+        self.gains = gains
+
+    def reset(self):
+        """Nothing is remembered."""
+
+    def command(self, reading, target):
+        off = target - reading
+        return [self.gains["trim"] + self.gains["ka"] * off[A], self.gains["kb"] * off[B]]
+
+
+def test_a_gain_that_is_sent_whatever_the_states_do_answers_to_none():
+    family = tl.controllers.Custom(Trimmed, {name: (-1.0, 1.0) for name in ("trim", "ka", "kb")}).bind(ARM)
+    assert [family.names[i] for i in answering(family, [B], np.zeros(4))] == ["kb"]
+    # The rate of a that its target asks for is answered at the target, too.
+    moving = np.array([0.0, 0.0, 0.4, 0.0])
+    pid = LAWS["pid"].bind(ARM)
+    assert [pid.names[i] for i in answering(pid, [B, Q], moving)] == ["b.kp", "b.ki", "b.kd"]
+
+
+def test_where_no_controller_of_a_family_answers_there_is_no_direction_and_nothing_is_added():
+    family = LAWS["feedback"].bind(ARM)
+    vectors, answers = directions_for(family, np.zeros(6), np.zeros(4), [P])
+    assert len(vectors) == len(answers) == 0
+    stream = Unit(1).part(1).stream("excitation")
+    assert not growing_chirps(ARM, (vectors, answers), 100, 0.02, 0.3, 0.25, stream).any()
+
+
+def test_directions_that_the_flown_gains_have_no_use_for_are_those_of_the_middle_of_the_box():
+    family = LAWS["pid"].bind(ARM)
+    genes = family.genes({**{name: 0.5 for name in THREE}, "b.kp": 0.0, "b.ki": 0.0, "b.kd": 0.0})
+    vectors, answers = directions_for(family, genes, np.zeros(4), [B, Q])
+    np.testing.assert_allclose(np.abs(vectors), [[0.0, 1.0]], atol=1e-12)
+    assert answers.tolist() == [0.0]
+    every, all_answers = directions_for(family, genes, np.zeros(4), [A, B, P, Q])
+    assert len(every) == 2 and (all_answers == 0.0).sum() == 1
+
+
+@pytest.mark.parametrize(("untunable", "counted"), [((), True), ((0, 1), True), ((0, 1, 2), False)])
+def test_gains_that_cannot_be_tuned_do_not_count(untunable, counted):
+    assert gains_count(planner_of(KNOWN), [MOVED], untunable) == counted
+
+
+HELD = replace(committee_of(KNOWN), lawless=(0,), untunable=(1,))
 """As if the angle's law, and so what its integral is for, were not known."""
 START = np.array([0.6, 0.7, 0.3])
 
@@ -128,9 +197,9 @@ def test_a_proposal_keeps_them_as_flown_excites_what_has_no_law_as_a_first_fligh
     tuned = planner.tune(HELD, [START], 1)
     found = planner.propose(HELD, tuned, flown, goal, 3, exploit=False)
     assert found.genes[1] == START[1] and not same_bits(found.genes, START)
-    assert "knows no law of angle yet: angle.ki stay as flown" in found.reason
+    assert "knows no law of angle yet: angle.ki stays as flown" in found.reason
     usual = planner.propose(committee_of(KNOWN), tuned, flown, goal, 3, exploit=False)
-    assert "stay as flown" not in usual.reason
+    assert "as flown" not in usual.reason
     most = planner.options.excitation_most
     assert np.abs(usual.excitation).max() <= most < np.abs(found.excitation).max()
     plain = planner.propose(HELD, tuned, flown, goal, 3, exploit=True, last=True)
@@ -141,8 +210,9 @@ def test_only_along_the_commands_that_answer_to_it():
     """Two axes with a command each, of which one has a law."""
     family = LAWS["pid"].bind(ARM)
     genes = np.full(6, 0.5)
-    vectors, answers = directions(family, genes, np.zeros(4), [B, Q])
+    vectors, answers = directions_for(family, genes, np.zeros(4), [B, Q])
     np.testing.assert_allclose(np.abs(vectors), [[0.0, 1.0]], atol=1e-12)
     every, all_answers = directions(family, genes, np.zeros(4))
-    assert len(every) == 2 and all_answers.max() >= answers[0] > 0.0
-    assert len(directions(family, genes, np.zeros(4), [])[0]) == 0
+    assert len(every) == 2
+    assert answers[0] == pytest.approx(np.sqrt(np.square(slopes(family, genes, np.zeros(4))[1]).sum()))
+    assert any(answers[0] == pytest.approx(other) for other in all_answers)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -97,6 +98,7 @@ class HoldBack(Value, Recorded, kind="hold_back"):
         target_state: ArrayLike,
         swing: float | None = None,
         reached: ArrayLike | None = None,
+        by: Sequence[int] | None = None,
     ) -> HoldBack | None:
         """Keeps an excitation away from the ends of the envelope.
 
@@ -114,6 +116,7 @@ class HoldBack(Value, Recorded, kind="hold_back"):
                 kept the envelope (2, n_x); None: there were none. Where the controller leads anyway, an excitation may
                 lead, too, and no further: its outer range then ends there, but at least a fifth of the room before the
                 envelope.
+            by: places of the states that count; None: all.
 
         Returns:
             The ranges; None if no state counts.
@@ -122,11 +125,13 @@ class HoldBack(Value, Recorded, kind="hold_back"):
         farthest = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
         rooms = np.array([_rooms(state, ends) for state, ends in zip(signals.states, farthest, strict=True)])
         outwards = np.array([-1.0, 1.0])
+        others = [] if by is None else [i for i in range(len(rooms)) if i not in by]
         most = (1.0 - LEFT) * rooms
         if swing is not None:
             place = signals.state_names.index
             for rate, of in _rates(signals).items():
                 rooms[place(rate)] = np.minimum(rooms[place(rate)], rooms[place(of)] / swing)
+        rooms[others] = np.inf
         # From the task's farthest points outwards: where the excitation is nothing, and where it begins to be less.
         ends = ENDS * rooms
         if reached is not None:

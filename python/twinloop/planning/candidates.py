@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.planning.excitation import chirps, directions, growing_chirps
+from twinloop.planning.excitation import chirps, directions, directions_for, growing_chirps
 from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
@@ -58,6 +58,7 @@ def candidates(
     number: int,
     leads: bool = True,
     lawless: Sequence[int] = (),
+    untunable: Sequence[int] = (),
 ) -> Candidates:
     """Draws candidates; the first one is the tuned gains as they are.
 
@@ -69,7 +70,8 @@ def candidates(
         goal: "both", "model" or "control".
         number: of the test, for its streams.
         leads: whether the committee can say where a flight leads; otherwise it is held back as a first one is.
-        lawless: states of which it knows no law: they are excited as in such a flight.
+        lawless: states of which it knows no law: their commands are excited as in a first flight.
+        untunable: numbers of the gains that answer to those: they stay as in the best flight.
 
     Returns:
         The candidates.
@@ -90,6 +92,7 @@ def candidates(
         places[way:] += back * (family.to_unit(flown.best) - place)
     genes = family.from_unit(places)
     genes[0] = tuned
+    genes[:, list(untunable)] = flown.best[list(untunable)]
     genes[count - again :] = flown.best
     if options.excitation <= 0.0:
         # The same flight once more would tell nothing: gains close by.
@@ -101,9 +104,10 @@ def candidates(
         # Gains that have flown bear more of it than before, and once more the same would tell little.
         stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
         along = directions_of(judge, flown.best) if options.hold_back and not leads else None
-        beside = (
-            directions_of(judge, flown.best, lawless) if options.hold_back and leads and lawless else None
-        )
+        target = np.atleast_2d(judge.task.target_state)[0]
+        beside = None
+        if options.hold_back and leads and lawless:
+            beside = directions_for(judge.family, flown.best, target, lawless)
         for i in range(1, count):
             repeated = i >= count - again
             if repeated and along is not None:
@@ -132,9 +136,9 @@ def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> En
     return ends[0], ends[1]
 
 
-def directions_of(judge: Judge, genes: Floats, states: Sequence[int] | None = None) -> tuple[Floats, Floats]:
+def directions_of(judge: Judge, genes: Floats) -> tuple[Floats, Floats]:
     """`directions` of the controller with some gains (size,), around the target of the campaign's task."""
-    return directions(judge.family, genes, np.atleast_2d(judge.task.target_state)[0], states)
+    return directions(judge.family, genes, np.atleast_2d(judge.task.target_state)[0])
 
 
 def unknown_excitation(

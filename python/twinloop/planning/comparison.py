@@ -186,7 +186,8 @@ class Comparison:
         """How far members are apart about flights of the task under gains from anywhere in their box, as a share."""
         judge = self.judge
         stream = judge.unit.part(self.wanted.number, 1).stream("candidates")
-        genes = judge.family.from_unit(stream.uniforms(ANYWHERE, judge.family.size))
+        drawn = judge.family.from_unit(stream.uniforms(ANYWHERE, judge.family.size))
+        genes = self.committee.as_flown(drawn, self.flown.best)
         return apart(judge.judge(self.members, genes, np.zeros(judge.signals.n_x), 1).qualities[:, 0])
 
     def _noise_of_tuned(self) -> tuple[float, float]:
@@ -258,7 +259,7 @@ class Comparison:
             flies=self.flown.flies,
             fared=self.flown.fared,
             # Nobody knows where an excitation leads once the last one was too much, and it begins anew.
-            stronger=self.committee.leads or self.flown.borne > 0,
+            stronger=self.flown.borne > 0 or (self.committee.leads and not self.committee.lawless),
             exploits=self.wanted.exploit and chosen == 0 and not repeats,
             plain=self.wanted.plain,
             repeats=repeats,
@@ -268,7 +269,7 @@ class Comparison:
             state=state,
             members=(high, low),
             lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
-            held=tuple(self.judge.family.names[i] for i in self.committee.held),
+            untunable=tuple(self.judge.family.names[i] for i in self.committee.untunable),
         )
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
@@ -92,29 +93,53 @@ def swing_of(duration: float) -> float:
     return duration / (2.0 * np.pi * FIRST[0])
 
 
-def directions(
-    family: Family, genes: Floats, target: Floats, states: Sequence[int] | None = None
-) -> tuple[Floats, Floats]:
+def directions(family: Family, genes: Floats, target: Floats) -> tuple[Floats, Floats]:
     """Directions in command space, and what a controller at rest sends along them.
 
     Args:
         family: of the controllers.
         genes: of one of them (size,).
         target: around which it is asked (n_x,).
-        states: that are off; None: all, with the directions that the controller has no use for.
 
     Returns:
-        Unit vectors, a row each, in scales of the commands (n_u, n_u), fewer for some states. For each, what is sent at
-        most for states that are off by their envelopes (by the scale, where a state has none), all together as one unit
-        vector (n_u,): the singular values; 0 where the controller has no use for a direction.
+        Unit vectors, a row each, in scales of the commands (n_u, n_u). For each, what is sent at most for states that
+        are off by their envelopes (by the scale, where a state has none), all together as one unit vector (n_u,): the
+        singular values; 0 where the controller has no use for a direction.
     """
-    sent = slopes(family, genes, target)
-    if states is not None:
-        sent = sent[:, list(states)]
+    values, vectors, used = _principal(slopes(family, genes, target))
+    return vectors, np.sqrt(np.where(used, values, 0.0))
+
+
+def directions_for(
+    family: Family, genes: Floats, target: Floats, states: Sequence[int]
+) -> tuple[Floats, Floats]:
+    """Directions in which controllers of a family answer to some states, and what one of them sends along each.
+
+    That one may not answer to them at all: its gains for them may be 0.
+
+    Args:
+        family: of the controllers.
+        genes: of one of them (size,).
+        target: around which it is asked (n_x,).
+        states: that are off.
+
+    Returns:
+        As `directions` does, of those that are used alone (d, n_u) and (d,).
+    """
+    middle = family.from_unit(np.full(family.size, 0.5))
+    own, usual = (slopes(family, each, target)[:, list(states)] for each in (genes, middle))
+    norms = [float(np.sqrt(np.square(sent).sum())) for sent in (own, usual)]
+    alike = [sent / (norm or 1.0) for sent, norm in zip((own, usual), norms, strict=True)]
+    _, vectors, used = _principal(np.concatenate(alike, axis=1))
+    answers = np.sqrt(np.square((vectors[used][:, :, np.newaxis] * own).sum(axis=1)).sum(axis=1))
+    return vectors[used], np.where(answers > sqrt(UNUSED) * norms[0], answers, 0.0)
+
+
+def _principal(sent: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Squares of a matrix's singular values (n,), its left singular vectors, a row each, and which values are not 0."""
     values, vectors = _core.eigen((sent[:, np.newaxis, :] * sent[np.newaxis, :, :]).sum(axis=2))
     used = values > UNUSED * values[-1] if values[-1] > 0.0 else np.zeros(len(values), bool)
-    answers = np.sqrt(np.where(used, values, 0.0))
-    return (vectors, answers) if states is None else (vectors[used], answers[used])
+    return values, vectors, used
 
 
 def slopes(family: Family, genes: Floats, target: Floats) -> Floats:
@@ -190,7 +215,7 @@ def _swings(
         phase = stream.uniform(0.0, 2.0 * np.pi)
         angle = 2.0 * np.pi * (first * t + (last - first) * t * t / (2.0 * duration)) + phase
         columns.append(sin(angle) * fading)
-    return np.stack(columns, axis=1)
+    return np.array(columns).reshape(count, steps).T
 
 
 def _fading(signals: Signals, steps: int, fade: float) -> Floats:

@@ -50,9 +50,9 @@ class Committee:
         gusts: disturbances that are known; None: nothing disturbs.
         foretells: whether what it foretold last came true.
         ending: the best one where what states do ends where flights have been; None where that is not asked.
-        gains_count: whether gains make a difference on the members.
+        gains_count: whether gains that can be tuned make a difference on the members.
         lawless: states that move, of which no law is known.
-        held: numbers of the gains that answer to those, and cannot be tuned on the members.
+        untunable: numbers of the gains that answer to those.
     """
 
     members: Sequence[_core.Model]
@@ -66,11 +66,11 @@ class Committee:
     ending: _core.Model | None = None
     gains_count: bool = True
     lawless: tuple[int, ...] = ()
-    held: tuple[int, ...] = ()
+    untunable: tuple[int, ...] = ()
 
     @property
     def leads(self) -> bool:
-        """Whether it can say where a flight leads: the best one follows the runs, and gains make a difference."""
+        """Whether it can say where a flight leads: the best one follows the runs, and there are gains to tune."""
         return self.trusted and self.gains_count
 
     @property
@@ -82,9 +82,9 @@ class Committee:
         return self.leads and self.explains
 
     def as_flown(self, genes: Floats, flown: Floats) -> Floats:
-        """Genes (..., size) whose gains that cannot be tuned are those of flown ones (size,)."""
-        kept = genes.copy()
-        kept[..., list(self.held)] = flown[list(self.held)]
+        """Genes (..., size) with the gains that cannot be tuned of others (size,), the best that were flown."""
+        kept, untunable = genes.copy(), list(self.untunable)
+        kept[..., untunable] = flown[untunable]
         return kept
 
     def disturbances(self, draws: int, steps: int) -> Floats | None:

@@ -86,7 +86,7 @@ class Planner(Judge):
 
         Args:
             committee: that judges.
-            starts: genes to start from; gains that cannot be tuned stay as in the first.
+            starts: genes to start from, the best flown first: gains that cannot be tuned stay as there.
             number: of runs, for its streams.
             scored: what was judged of the same before it was cut, and who keeps what is judged; None: it begins.
         """
@@ -131,8 +131,8 @@ class Planner(Judge):
         first = float(self.judge(members, known[np.newaxis], sds, draws, disturbances=met).mean[0])
         unit = first if np.isfinite(first) else 0.0
 
-        def score(places: Floats) -> Floats:
-            genes = committee.as_flown(places, known)
+        def score(asked: Floats) -> Floats:
+            genes = committee.as_flown(asked, known)
             judged = self.judge(members, genes, sds, draws, disturbances=met)
             lost, usage = judged.lost, judged.finite.worst_usage
             if limiting:
@@ -173,18 +173,21 @@ class Planner(Judge):
         added = unknown_excitation(self, self.options, directions_of(self, genes), 0, stream)
         return added, self.held_back(self.task.initial_state, self.task.target_state)
 
-    def held_back(self, start: Floats, target: Floats, reached: Floats | None = None) -> HoldBack | None:
+    def held_back(
+        self, start: Floats, target: Floats, reached: Floats | None = None, by: Sequence[int] | None = None
+    ) -> HoldBack | None:
         """What holds back an excitation of which no model can say where it leads; None where that is off.
 
         Args:
             start: of the flight (n_x,).
             target: of it, (n_x,) or a row for each state.
             reached: smallest and largest value of each state under the same gains (2, n_x); None: they have not flown.
+            by: states that hold it back; None: all.
         """
         if not self.options.hold_back:
             return None
         swing = swing_of(self.task.steps * self.signals.dt)
-        return HoldBack.between(self.signals, start, target, swing, reached)
+        return HoldBack.between(self.signals, start, target, swing, reached, by)
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""
@@ -248,9 +251,9 @@ class Planner(Judge):
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""
         drafts = candidates(
-            self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads, committee.lawless
-        )
-        drafts = replace(drafts, genes=committee.as_flown(drafts.genes, flown.best))
+            self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads,
+            committee.lawless, committee.untunable,
+        )  # fmt: skip
         drafts = drafts.quiet() if wanted.plain else drafts
         return Comparison(self, self.options, committee, drafts, flown, wanted)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twinloop._ground.elementary import log
@@ -30,7 +31,7 @@ class Why:
         state: in which they are.
         members: numbers of the two.
         lawless: names of states of which no law is known.
-        held: names of the gains that answer to those.
+        untunable: names of the gains that answer to those.
     """
 
     trusted: bool
@@ -47,7 +48,7 @@ class Why:
     state: int
     members: tuple[int, int]
     lawless: tuple[str, ...] = ()
-    held: tuple[str, ...] = ()
+    untunable: tuple[str, ...] = ()
 
 
 def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
@@ -58,7 +59,9 @@ def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
         signals: of the system.
         options: of the planning.
     """
-    sentences = [_what_flies(why, options), _what_it_tells(why, signals), _what_stays(why)]
+    sentences = [_what_flies(why, options), _what_it_tells(why, signals)]
+    if why.trusted and why.gains_count and why.lawless:
+        sentences.append(what_stays(why.lawless, () if why.repeats else why.untunable))
     if not why.safe:
         sentences.append(
             "No candidate completes the flight within the envelope and its margin on every"
@@ -86,6 +89,8 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     high, low = why.members
     if not why.trusted:
         return "The twin does not follow the flights so far: it cannot say what this one will show."
+    if not why.gains_count and why.lawless:
+        return f"{what_stays(why.lawless)[:-1]}, and it flies alike with any other gains than those that answer to it."
     if not why.gains_count:
         return "The twin does not know yet what the commands do to the task: it flies alike with any gains."
     if why.exploits:
@@ -102,8 +107,14 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     return "The models agree on it: the flight tests what they have in common."
 
 
-def _what_stays(why: Why) -> str:
-    """Which gains are not tuned, where others are."""
-    if not why.held or why.repeats or not (why.trusted and why.gains_count):
-        return ""
-    return f"The twin knows no law of {enumerated(why.lawless)} yet: {enumerated(why.held)} stay as flown."
+def what_stays(lawless: Sequence[str], untunable: Sequence[str] = ()) -> str:
+    """Of what the twin knows no law, and which gains stay as flown for that.
+
+    Args:
+        lawless: names of the states, at least one.
+        untunable: names of the gains; none: nothing is said of them.
+    """
+    unknown = f"The twin knows no law of {enumerated(lawless)} yet"
+    if not untunable:
+        return f"{unknown}."
+    return f"{unknown}: {enumerated(untunable)} stay{'s' * (len(untunable) == 1)} as flown."

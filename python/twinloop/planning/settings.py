@@ -17,7 +17,7 @@ class PlanningOptions:
         excitation: amplitude at which the first test's excitation begins, at most, in units of each command's scale;
             0: none.
         excitation_unknown: largest amplitude to which it grows, from cycle to cycle and from test to test, until a law
-            is known; only where it is held back.
+            is known, of the commands that answer to a state until that one's is; only where it is held back.
         hold_back: whether such an excitation is held back during the flight as the states approach the ends of their
             envelopes.
         excitation_most: largest amplitude of a later test.

@@ -38,7 +38,7 @@ def tune_within(
         committee: whose models with more delay have to keep the envelope.
         members: of it that judge, and may not leave the bounds.
         bounds: of the states (2, n_x).
-        starts: genes to start from; gains that cannot be tuned stay as in the first.
+        starts: genes to start from, the best flown first: gains that cannot be tuned stay as there.
         number: of the test, for its streams.
         watch: called after every generation.
 
@@ -48,8 +48,8 @@ def tune_within(
     most, nothing = 1.0 - options.margin, np.zeros(judge.signals.n_x)
     unit = float(judge.judge_within(bounds, members, starts[0][np.newaxis]).mean_of_finite[0])
 
-    def score(places: Floats) -> Floats:
-        genes = committee.as_flown(places, starts[0])
+    def score(asked: Floats) -> Floats:
+        genes = committee.as_flown(asked, starts[0])
         near = judge.judge_within(bounds, members, genes)
         lost, excess = near.lost, np.maximum(0.0, near.finite.worst_usage - most)
         if committee.delayed:

@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 import twinloop as tl
 from strategies import program_text
@@ -106,64 +105,3 @@ def test_a_body_rate_without_a_law_takes_the_angle_about_its_axis_with_it(monkey
     )
     monkeypatch.setattr(unmoved, "unmoved_states", lambda *arguments: [5])
     assert lawless_states(identified, [], SimpleNamespace(signals=signals)) == (2, 5)
-
-
-AXES = tl.Signals(
-    [
-        tl.State("a", "rad", 1.0, envelope=(-2.0, 2.0)),
-        tl.State("b", "rad", 1.0, envelope=(-2.0, 2.0)),
-        tl.State("p", "rad/s", 2.0, derivative_of="a", envelope=(-6.0, 6.0)),
-        tl.State("q", "rad/s", 2.0, derivative_of="b", envelope=(-6.0, 6.0)),
-    ],
-    [tl.Command("u", "N m", (-1.0, 1.0)), tl.Command("v", "N", (-1.0, 1.0))],
-    0.02,
-)
-FIRST = {"a.kp": 0.3, "a.ki": 0.0, "a.kd": 0.3, "b.kp": 0.3, "b.ki": 0.1, "b.kd": 0.5}
-
-
-def flown(test, seed):
-    """p' = 4 u - p / 2 and q' = v / 2 + gust, under the controller of a test."""
-    draw, controller = np.random.default_rng(seed), test.controller()
-    state, gust, noise = test.initial_state.copy(), 0.2 * draw.standard_normal(), 2e-3
-    states, commands = [state + noise * draw.standard_normal(4)], []
-    for _ in range(test.steps):
-        commands.append(controller.command(states[-1], test.target_state))
-        accelerations = np.array([4.0 * commands[-1][0] - 0.5 * state[2], 0.5 * commands[-1][1] + gust])
-        state[:2] += AXES.dt * (state[2:] + 0.5 * AXES.dt * accelerations)
-        state[2:] += AXES.dt * accelerations
-        gust += -0.04 * gust + 0.2 * np.sqrt(AXES.dt) * draw.standard_normal()
-        states.append(state + noise * draw.standard_normal(4))
-    return tl.Trajectory(AXES.dt * np.arange(len(states)), np.array(states), np.array(commands))
-
-
-def test_gains_of_an_axis_whose_law_gusts_hide_stay_as_flown_until_a_stronger_excitation_shows_it():
-    family = tl.controllers.PID(
-        axes=[("a", "p"), ("b", "q")],
-        gains={
-            f"{axis}.{kind}": (0.0, most)
-            for axis in "ab"
-            for kind, most in (("kp", 4.0), ("ki", 1.0), ("kd", 2.0))
-        },
-    )
-    campaign = tl.Campaign(
-        AXES, controller=family, initial_state=[0.5, 0.3, 0.0, 0.0], target_state=np.zeros(4), duration=3.0,
-        seed=3, threads=1, progress=None,
-    )  # fmt: skip
-    first = campaign.test(FIRST)
-    campaign.tell(first, flown(first, 30))
-    with pytest.warns(tl.RemarkWarning, match="nothing drives q"):
-        second = campaign.ask()
-    gains = second.parameters
-    assert {name: gains[name] for name in FIRST if name[0] == "b"} == {
-        name: value for name, value in FIRST.items() if name[0] == "b"
-    }
-    assert gains["a.kp"] > 1.0 and campaign.best_test.parameters["b.kp"] == FIRST["b.kp"]
-    assert second.reason.endswith("no law of b and q yet: b.kp, b.ki and b.kd stay as flown.")
-    strongest = np.abs(second.excitation).max(axis=0)
-    assert strongest[0] <= campaign.options.excitation_most < strongest[1] and second.hold_back is not None
-    for seed in (31, 32):
-        campaign.tell(second, flown(second, seed))
-        second = campaign.ask()
-    # b's law is found.
-    assert "unmoved" not in [remark.code for remark in campaign.twin.remarks]
-    assert second.parameters["b.kp"] > 1.0 and second.hold_back is None

@@ -11,7 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._experiment.envelope import outside
 from twinloop._ground.arrays import Floats
-from twinloop._ground.texts import two_digits
+from twinloop._ground.texts import enumerated, two_digits
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
@@ -29,6 +29,7 @@ from twinloop.planning.gusts import Moved
 from twinloop.planning.judging import Committee, Judged, expected, risk
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared
+from twinloop.planning.reasons import what_stays
 from twinloop.test import Test
 
 WORTH = 0.005
@@ -93,7 +94,7 @@ class Choice:
         if not refused:
             share = f"{100 * better:.3g} %"
             found = f"by {self._more} in {share} of its predictions"
-            reason = f"Tuned on the twin: better than the best flown gains {found}."
+            reason = f"Tuned on the twin: better than the best flown gains {found}.{self._stays}"
             if not flies:
                 reason = (
                     "Tuned on the twin: no model predicts that they leave the envelope, as the best flown gains"
@@ -130,6 +131,16 @@ class Choice:
             return ""
         return f" Test {better.number} was measured better; without excitation these are better."
 
+    @property
+    def _lawless(self) -> list[str]:
+        return [self.planner.signals.state_names[i] for i in self.committee.lawless]
+
+    @property
+    def _stays(self) -> str:
+        """Which gains are not tuned, as they answer to what has no law; nothing where all are."""
+        untunable = [self.planner.family.names[i] for i in self.committee.untunable]
+        return f" {what_stays(self._lawless, untunable)}" if self._lawless else ""
+
     def _refused(
         self, members: Sequence[_core.Model], judged: Judged, tuned: Floats, flown: Test | None
     ) -> str:
@@ -144,6 +155,8 @@ class Choice:
             )
         if flown is not None and self.misses and self._tuned_have_flown():
             return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
+        if self.committee.lawless and (flown is None or not self.committee.gains_count):
+            return f"the twin knows no law of {enumerated(self._lawless)} yet"
         if not self.committee.gains_count:
             return "the gains have no effect on the twin, which does not know yet what the commands do to the task"
         off = off_start(self.book)

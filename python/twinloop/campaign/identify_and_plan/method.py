@@ -15,6 +15,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop._ground.steps import STEPS, Step
 from twinloop._ground.streams import Unit
+from twinloop._ground.texts import enumerated
 from twinloop.campaign import standing
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
@@ -159,6 +160,13 @@ class IdentifyAndPlan:
         if self.options.tests != "ask":
             return self._asked_of_nobody(book)
         committee, best = self._committee(book), standing.best_flown(book)
+        if best is None and committee.lawless:
+            names = enumerated([self.setup.signals.state_names[i] for i in committee.lawless])
+            raise NotAvailable(
+                f"Campaign.ask: expected a flown test, or a twin with a law of {names}, found neither: gains that"
+                " answer to that cannot be tuned. Fly a controller that you trust: campaign.test(gains), then"
+                " campaign.tell."
+            )
         if best is None and not committee.trusted:
             raise NotAvailable(
                 "Campaign.ask: expected a twin that follows the runs that it was learnt from, or a flown test, found"
@@ -168,13 +176,15 @@ class IdentifyAndPlan:
         waits = self._last_of(book, tuned) is not None
         final = last and self.options.exploit_last and not waits
         flown = self._flown(book, best, tuned)
+        # Of what has no law nothing would be learnt without an excitation.
+        exploits = self.setup.goal == "control" and not committee.lawless
         found = self.planner.propose(
             committee,
             tuned,
             flown,
             self.setup.goal,
             len(book.tests),
-            final or (self.setup.goal == "control" and len(book.flown) > 1 and not waits),
+            final or (exploits and len(book.flown) > 1 and not waits),
             final,
         )
         found = self._expected(book, committee, found)
@@ -189,7 +199,7 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
-            hold_back=None if committee.leads and not committee.lawless else self._held_back(book, found),
+            hold_back=self._held_back(book, committee, found),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
@@ -227,12 +237,13 @@ class IdentifyAndPlan:
 
         return next(filter(is_last, book.waiting()), None)
 
-    def _held_back(self, book: Logbook, found: Proposal) -> HoldBack | None:
-        """What holds back the excitation of a test of a committee that cannot say where it leads."""
-        if found.excitation is None:
+    def _held_back(self, book: Logbook, committee: Committee, found: Proposal) -> HoldBack | None:
+        """What holds back the excitation of a test: states of which a committee cannot say where it leads them."""
+        if found.excitation is None or (committee.leads and not committee.lawless):
             return None
         reached = standing.reached(book, found.genes)
-        return self.planner.held_back(found.initial_state, found.target_state, reached)
+        by = committee.lawless if committee.leads else None
+        return self.planner.held_back(found.initial_state, found.target_state, reached, by)
 
     def _as_test(self, book: Logbook, found: Proposal) -> Test:
         """The test that a proposal would become."""
@@ -362,7 +373,7 @@ class IdentifyAndPlan:
         borne = slower(TOLERATED)
         flights = without_wrong_readings(latest.flights(book.experiments), self.setup.signals)
         lawless = lawless_states(latest.identified, flights, self.setup)
-        held = answering(self.setup.family, lawless, np.atleast_2d(self.setup.target_state)[0])
+        untunable = answering(self.setup.family, lawless, np.atleast_2d(self.setup.target_state)[0])
         return Committee(
             latest.believed,
             sensors,
@@ -373,9 +384,9 @@ class IdentifyAndPlan:
             slower(TUNED_WITH) if true else borne,
             latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
             self._ending(latest, book),
-            len(held) < self.setup.family.size and gains_count(self.planner, latest.believed),
+            gains_count(self.planner, latest.believed, untunable),
             lawless,
-            held,
+            untunable,
         )
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
