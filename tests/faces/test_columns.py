@@ -26,8 +26,21 @@ def named(name, test):
 
 def test_the_file_of_the_only_campaign_of_a_store_stands_beside_it(test):
     assert columns_file(StoredAs("runs/rig.db"), test).as_posix() == "runs/rig-test-1.csv"
-    assert columns_file(StoredAs("postgresql://host/db"), test).as_posix() == "campaign-test-1.csv"
     assert named("tank", test).as_posix() == "runs/rig-test-1-of-tank.csv"
+
+
+def test_where_the_store_is_a_server_it_is_here_and_has_the_name_of_the_database(test):
+    """Campaigns of two databases of a server may be flown from one folder."""
+
+    def file(address, name=None):
+        return columns_file(StoredAs(address, name), test).as_posix()
+
+    assert file("postgresql://host/lab") == "lab-test-1.csv"
+    assert file("postgresql+psycopg://me@host:5432/lab?sslmode=require", "tank") == "lab-test-1-of-tank.csv"
+    assert file("postgresql://host") == file("postgresql://host/") == "campaign-test-1.csv"
+    others = {file(f"postgresql://host/{name}") for name in ("Lab", "lab/2", "lab.2", "a" * 200)}
+    assert len(others | {"lab-test-1.csv"}) == 5
+    assert all("/" not in other and len(other) < 100 for other in others)
 
 
 @pytest.mark.parametrize("name", NAMES, ids=ascii)

@@ -219,7 +219,7 @@ def test_a_person_flies_a_campaign_on_a_server(server, tmp_path, monkeypatch):
     campaign.close()
     asked = CliRunner().invoke(main, ["ask", address])
     assert asked.exit_code == 0 and "TEST 1" in asked.stdout and "secret" not in asked.stdout
-    assert (tmp_path / "campaign-test-1.csv").is_file()
+    assert (tmp_path / "by_hand-test-1.csv").is_file()
     run = PLANT.run(tl.Campaign.load(address, read_only=True).tests[1])
     columns = {"t": run.t, "angle": run.states[:, 0], "rate": run.states[:, 1], "torque": run.commands[:, 0]}
     write_columns(tmp_path / "flight.csv", columns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -40,20 +41,26 @@ def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
 
 
 def columns_file(stored_as: StoredAs, test: Test) -> Path:
-    """The file of a test, beside the store; each campaign of a store has files of its own.
+    """The file of a test, beside the store, or here where that is a server; each campaign has files of its own.
 
     Args:
         stored_as: under what the campaign is found.
         test: of the campaign.
     """
     beside = file_beside(stored_as.store)
-    stem = Path("campaign") if beside is None else beside.with_suffix("")
+    stem = Path(_database(stored_as.store)) if beside is None else beside.with_suffix("")
     of = "" if stored_as.name is None else f"-of-{_in_a_file_name(stored_as.name)}"
     return stem.with_name(f"{stem.name}-test-{test.number}{of}.csv")
 
 
+def _database(address: str) -> str:
+    """The name of a server's database as a part of that of a file; "campaign" where the address names none."""
+    name = urlsplit(address).path.strip("/")
+    return _in_a_file_name(name) if name else "campaign"
+
+
 def _in_a_file_name(name: str) -> str:
-    """A name of a campaign as a part of that of a file: readable, and another one for any other campaign.
+    """A name as a part of that of a file: readable, and another one for any other name.
 
     Where it has letters that a folder may refuse or take for others, a few digits of its hash keep it apart.
     """
