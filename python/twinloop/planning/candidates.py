@@ -70,7 +70,8 @@ def candidates(
         goal: "both", "model" or "control".
         number: of the test, for its streams.
         leads: whether the committee can say where a flight leads; otherwise it is held back as a first one is.
-        lawless: states of which it knows no law: their commands are excited as in a first flight.
+        lawless: states of which it knows no law: their commands are excited as in a first flight. None where nothing
+            would hold that back.
         untunable: numbers of the gains that answer to those: they stay as in the best flight.
 
     Returns:
@@ -105,9 +106,7 @@ def candidates(
         stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
         along = directions_of(judge, flown.best) if options.hold_back and not leads else None
         target = np.atleast_2d(judge.task.target_state)[0]
-        beside = None
-        if options.hold_back and leads and lawless:
-            beside = directions_for(judge.family, flown.best, target, lawless)
+        beside = directions_for(judge.family, flown.best, target, lawless) if leads and lawless else None
         for i in range(1, count):
             repeated = i >= count - again
             if repeated and along is not None:

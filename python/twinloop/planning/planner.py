@@ -182,12 +182,13 @@ class Planner(Judge):
             start: of the flight (n_x,).
             target: of it, (n_x,) or a row for each state.
             reached: smallest and largest value of each state under the same gains (2, n_x); None: they have not flown.
-            by: states that hold it back; None: all.
+            by: states that hold it back, if any of them has a limit; None, or none that has one: all.
         """
         if not self.options.hold_back:
             return None
         swing = swing_of(self.task.steps * self.signals.dt)
-        return HoldBack.between(self.signals, start, target, swing, reached, by)
+        found = HoldBack.between(self.signals, start, target, swing, reached, by)
+        return HoldBack.between(self.signals, start, target, swing, reached) if found is None else found
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""
@@ -250,9 +251,10 @@ class Planner(Judge):
 
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""
+        held_back = self.held_back(self.task.initial_state, self.task.target_state) is not None
         drafts = candidates(
             self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads,
-            committee.lawless, committee.untunable,
+            committee.lawless if held_back else (), committee.untunable,
         )  # fmt: skip
         drafts = drafts.quiet() if wanted.plain else drafts
         return Comparison(self, self.options, committee, drafts, flown, wanted)

@@ -1,5 +1,7 @@
 """What is flown where gusts hide an axis' law: its gains stay as they are, its commands are excited as at first."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,9 +42,9 @@ def flown(test, seed, coupled=0.0, authority=0.5):
     return tl.Trajectory(AXES.dt * np.arange(len(states)), np.array(states), np.array(commands))
 
 
-def begun(gains=GAINS, options=BRIEF, **changes):
+def begun(gains=GAINS, options=BRIEF, signals=AXES, **changes):
     return tl.Campaign(
-        AXES, controller=tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=gains),
+        signals, controller=tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=gains),
         initial_state=[0.5, 0.3, 0.0, 0.0], target_state=np.zeros(4), duration=3.0, seed=3, threads=1,
         progress=None, options=options, **changes,
     )  # fmt: skip
@@ -84,6 +86,19 @@ def test_they_stay_as_flown_until_a_stronger_excitation_has_shown_the_law():
         test = campaign.ask()
     assert "unmoved" not in codes(campaign)
     assert test.parameters["b.kp"] > 1.0 and test.hold_back is None
+
+
+@pytest.mark.parametrize(
+    ("limited", "held_by"),
+    [("abpq", {"b", "q"}), ("b", {"b", "q"}), ("ap", {"a", "p"}), ("", None)],
+    ids=repr,
+)
+def test_states_without_a_law_hold_their_excitation_back_or_all_that_have_an_envelope(limited, held_by):
+    """A rate has room as long as what it is the rate of has. Where nothing would, no such excitation is flown."""
+    states = [state if state.name in limited else replace(state, envelope=None) for state in AXES.states]
+    test = told(signals=replace(AXES, states=states)).ask()
+    assert (test.hold_back and set(test.hold_back.ranges(AXES))) == held_by
+    assert (np.abs(test.excitation[:, 1]).max() > 0.1) == (held_by is not None)
 
 
 def test_the_last_flight_has_no_excitation_and_keeps_them_too():
