@@ -9,8 +9,14 @@ import twinloop as tl
 from committees import TUNED, committee_of, member, planner_of, signals
 from oracles import same_bits
 from twinloop._ground.streams import Unit
-from twinloop.planning.effect import answering, gains_count
-from twinloop.planning.excitation import directions, directions_for, growing_chirps, slopes
+from twinloop.planning.effect import answering, gains_count, without_effect
+from twinloop.planning.excitation import (
+    directions,
+    directions_for,
+    growing_chirps,
+    slopes,
+    usual_genes,
+)
 from twinloop.planning.proposal import Flown
 from twinloop.planning.within import tune_within
 
@@ -93,7 +99,7 @@ LAWS = {
 def test_gains_answer_to_a_state_if_what_is_sent_while_it_is_off_depends_on_them(law, states, names):
     """Over two periods, so that rates that are differences, and integrals, are answered too."""
     family = LAWS[law].bind(ARM)
-    found = answering(family, states, np.array([0.3, -0.2, 0.0, 0.0]))
+    found = answering(family, states, np.array([0.3, -0.2, 0.0, 0.0]), usual_genes(family))
     assert sorted(family.names[i] for i in found) == sorted(names.split())
 
 
@@ -109,7 +115,7 @@ def large(law, most):
     else:
         family = tl.controllers.PID(axes=[("a", law), ("b", law and "q")], gains=gains)
     family = family.bind(ARM)
-    return [family.names[i] for i in answering(family, [B], np.zeros(4))]
+    return [family.names[i] for i in answering(family, [B], np.zeros(4), usual_genes(family))]
 
 
 @pytest.mark.parametrize("most", [1e-3, 1.0, 1e2, 1e4])
@@ -136,11 +142,70 @@ class Trimmed:
 
 def test_a_gain_that_is_sent_whatever_the_states_do_answers_to_none():
     family = tl.controllers.Custom(Trimmed, {name: (-1.0, 1.0) for name in ("trim", "ka", "kb")}).bind(ARM)
-    assert [family.names[i] for i in answering(family, [B], np.zeros(4))] == ["kb"]
+    assert [family.names[i] for i in answering(family, [B], np.zeros(4), usual_genes(family))] == ["kb"]
     # The rate of a that its target asks for is answered at the target, too.
     moving = np.array([0.0, 0.0, 0.4, 0.0])
     pid = LAWS["pid"].bind(ARM)
-    assert [pid.names[i] for i in answering(pid, [B, Q], moving)] == ["b.kp", "b.ki", "b.kd"]
+    assert [pid.names[i] for i in answering(pid, [B, Q], moving, usual_genes(pid))] == [
+        "b.kp",
+        "b.ki",
+        "b.kd",
+    ]
+
+
+class Banded:
+    """A dead band around b's target, and a trim that saturates the command wherever it is large."""
+
+    def __init__(self, **gains):
+        self.gains = gains
+
+    def reset(self):
+        """Nothing is remembered."""
+
+    def command(self, reading, target):
+        off = target - reading
+        return [0.0, self.gains["trim"] + self.gains["kb"] * (off[B] if abs(off[B]) > 0.05 else 0.0)]
+
+
+def test_a_dead_band_and_a_command_that_saturates_at_the_target_hide_no_gain():
+    family = tl.controllers.Custom(Banded, {"trim": (0.0, 40.0), "kb": (0.0, 2.0)}).bind(ARM)
+    usual = usual_genes(family)
+    assert usual[0] > 9.0  # the usual controller sends the bound of its command, whatever b does
+    flown = np.array([0.0, 0.5])
+    # The trim, too: a large one saturates the command, and leaves b unanswered.
+    assert [family.names[i] for i in answering(family, [B], np.zeros(4), flown)] == ["trim", "kb"]
+    assert answering(family, [A], np.zeros(4), flown) == ()
+
+
+def test_boxes_around_zero_hide_nothing_either():
+    gains = {name: (-4.0, 4.0) for name in THREE}
+    family = tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=gains).bind(ARM)
+    assert not slopes(family, family.from_unit(np.full(6, 0.5)), np.zeros(4)).any()
+    vectors, answers = directions_for(family, np.zeros(6), np.zeros(4), [B, Q])
+    np.testing.assert_allclose(np.abs(vectors), [[0.0, 1.0]], atol=1e-12)
+    assert answers.tolist() == [0.0]
+    assert [family.names[i] for i in answering(family, [B, Q], np.zeros(4), np.zeros(6))] == [
+        "b.kp",
+        "b.ki",
+        "b.kd",
+    ]
+
+
+def test_gains_without_an_effect_are_those_that_change_no_flight():
+    planner = planner_of(KNOWN)
+    beside = usual_genes(planner.family)
+    assert without_effect(planner, [IDLE], beside) == (0, 1, 2)
+    assert without_effect(planner, [IDLE, MOVED], beside) == without_effect(planner, [MOVED], beside) == ()
+    one = replace_task(planner, start=np.zeros(2))
+    # At rest on the target only noise and the integral of nothing are answered: no gain makes a difference.
+    assert without_effect(one, [MOVED], beside) == (0, 1, 2)
+
+
+def replace_task(planner, start):
+    """The same planner for flights that begin elsewhere."""
+    other = planner_of(KNOWN)
+    other.task = replace(planner.task, initial_state=start)
+    return other
 
 
 def test_where_no_controller_of_a_family_answers_there_is_no_direction_and_nothing_is_added():

@@ -93,12 +93,14 @@ def candidates(
         places[way:] += back * (family.to_unit(flown.best) - place)
     genes = family.from_unit(places)
     genes[0] = tuned
-    genes[:, list(untunable)] = flown.best[list(untunable)]
+    kept = list(untunable)
+    genes[:, kept] = flown.best[kept]
     genes[count - again :] = flown.best
     if options.excitation <= 0.0:
         # The same flight once more would tell nothing: gains close by.
         near = family.to_unit(flown.best) + 0.3 * options.nearness * stream.normals(again, family.size)
         genes[count - again :] = family.from_unit(near)
+        genes[:, kept] = flown.best[kept]
     excitation = np.zeros((count, steps, judge.signals.n_u))
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:

@@ -263,6 +263,8 @@ class Comparison:
             exploits=self.wanted.exploit and chosen == 0 and not repeats,
             plain=self.wanted.plain,
             repeats=repeats,
+            excited=bool(self.drafts.excitation[chosen].any()),
+            varied=self.drafts.genes[chosen].tobytes() != self.flown.best.tobytes(),
             safe=safe,
             disagreement=disagreement,
             step=row,

@@ -1,4 +1,4 @@
-"""Effect: whether gains make a difference on a twin at all, and which of them answer to some states."""
+"""Effect: whether gains make a difference on a twin, which of them make none, and which answer to some states."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family
-from twinloop.planning.excitation import off_by
+from twinloop.planning.excitation import off_by, usual_genes
 from twinloop.planning.judging import Judge
 
-BESIDE = 0.625
-"""Place in the box of all gains beside which each is moved: in the middle some are 0, and hide those they multiply."""
-OFF = (2.0**-10, 2.0**-20, 2.0**-30)
-"""Shares of half the envelope by which a state is off: by more than a little, large gains saturate their command."""
+OFF = (2.0**-3, 2.0**-6, 2.0**-10, 2.0**-20, 2.0**-30)
+"""Shares of half the envelope by which a state is off: a little is within a dead band, and by more gains saturate."""
+FAR = 0.75
+"""Place in its box beyond which a gain is moved to the low end, and not to the high one."""
 ROUNDING = 1e-12
 """Share of a command's scale below which a difference of commands is rounding."""
 
@@ -40,18 +40,43 @@ def gains_count(judge: Judge, members: Sequence[_core.Model], untunable: Sequenc
     return bool((~np.isfinite(qualities) | (qualities != qualities[:, :, :1])).any())
 
 
-def answering(family: Family, states: Sequence[int], target: Floats) -> tuple[int, ...]:
+def without_effect(judge: Judge, members: Sequence[_core.Model], beside: Floats) -> tuple[int, ...]:
+    """Numbers of the gains that alone change no flight of the task on any member, to the bit, at either end.
+
+    Args:
+        judge: of the campaign.
+        members: of a committee.
+        beside: gains (size,) beside which each is moved.
+    """
+    family = judge.family
+    genes = np.tile(beside, (2, family.size, 1))
+    for end, place in enumerate((0.0, 1.0)):
+        ends = family.from_unit(np.full(family.size, place))
+        genes[end, np.arange(family.size), np.arange(family.size)] = ends
+    every = np.concatenate([beside[np.newaxis], *genes])
+    qualities = judge.judge(members, every, np.zeros(judge.signals.n_x), 1).qualities
+    moved = (qualities != qualities[:, :, :1]).any(axis=(0, 1))[1:].reshape(2, family.size).any(axis=0)
+    return tuple(np.flatnonzero(~moved).tolist())
+
+
+def answering(family: Family, states: Sequence[int], target: Floats, beside: Floats) -> tuple[int, ...]:
     """Numbers of the gains on which it depends how commands change as a state goes off its target.
 
     Args:
         family: of the controllers.
         states: that go off, one after another, for two periods: their rates and integrals are answered, too.
         target: from which they go off (n_x,).
+        beside: gains (size,) of a controller that is asked beside the usual one of the family.
     """
-    if not states:
-        return ()
-    places = np.full((family.size + 1, family.size), BESIDE)
-    places[np.arange(family.size), np.arange(family.size)] = 1.0
+    places = [family.to_unit(usual_genes(family)), family.to_unit(beside)] if states else []
+    found = [_answering(family, states, target, place) for place in places]
+    return tuple(sorted({gain for each in found for gain in each}))
+
+
+def _answering(family: Family, states: Sequence[int], target: Floats, beside: Floats) -> list[int]:
+    """The same beside one controller, whose gains are at these places in their box (size,)."""
+    places = np.tile(beside, (family.size + 1, 1))
+    places[np.arange(family.size), np.arange(family.size)] = np.where(beside < FAR, 1.0, 0.0)
     controllers = [family.controller(genes) for genes in family.from_unit(places)]
     least = ROUNDING * np.array([command.size for command in family.signals.commands])
     targets = np.tile(target, (3, 1))
@@ -61,9 +86,10 @@ def answering(family: Family, states: Sequence[int], target: Floats) -> tuple[in
     for state, share in itertools.product(states, OFF):
         readings = targets.copy()
         readings[1:] = off_by(family.signals, state, target, share)
-        *moved, beside = (
+        *moved, usual = (
             controller.commands(readings, targets) - sent
             for controller, sent in zip(controllers, there, strict=True)
         )
-        answers |= [(np.abs(sent - beside) > least).any() for sent in moved]
-    return tuple(np.flatnonzero(answers).tolist())
+        answers |= [(np.abs(sent - usual) > least).any() for sent in moved]
+    numbers: list[int] = np.flatnonzero(answers).tolist()
+    return numbers

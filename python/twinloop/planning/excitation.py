@@ -31,6 +31,8 @@ GROWTH = 8.0
 """Ratio of its excitation at the end, before it fades, to that at the beginning."""
 NEARBY = 1.0 / 1024.0
 """Share of the envelope by which a state is off where the answer of a controller is asked for: a power of two."""
+USUAL = 0.625
+"""Place of all gains in their box where a family is asked what its controllers do: in the middle many gains are 0."""
 UNUSED = 1e-6
 """Share of the strongest direction in command space, squared, below which a controller has no use for one."""
 
@@ -126,8 +128,7 @@ def directions_for(
     Returns:
         As `directions` does, of those that are used alone (d, n_u) and (d,).
     """
-    middle = family.from_unit(np.full(family.size, 0.5))
-    own, usual = (slopes(family, each, target)[:, list(states)] for each in (genes, middle))
+    own, usual = (slopes(family, each, target)[:, list(states)] for each in (genes, usual_genes(family)))
     norms = [float(np.sqrt(np.square(sent).sum())) for sent in (own, usual)]
     alike = [sent / (norm or 1.0) for sent, norm in zip((own, usual), norms, strict=True)]
     _, vectors, used = _principal(np.concatenate(alike, axis=1))
@@ -140,6 +141,11 @@ def _principal(sent: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     values, vectors = _core.eigen((sent[:, np.newaxis, :] * sent[np.newaxis, :, :]).sum(axis=2))
     used = values > UNUSED * values[-1] if values[-1] > 0.0 else np.zeros(len(values), bool)
     return values, vectors, used
+
+
+def usual_genes(family: Family) -> Floats:
+    """Gains (size,) of a controller that does what controllers of a family do: hardly any of them is 0."""
+    return family.from_unit(np.full(family.size, USUAL))
 
 
 def slopes(family: Family, genes: Floats, target: Floats) -> Floats:

@@ -190,6 +190,13 @@ class Planner(Judge):
         found = HoldBack.between(self.signals, start, target, swing, reached, by)
         return HoldBack.between(self.signals, start, target, swing, reached) if found is None else found
 
+    def excites(self, committee: Committee) -> bool:
+        """Whether flights excite the commands that answer to states of which a committee knows no law, held back."""
+        options = self.options
+        some = options.excitation > 0.0 and options.excitation_most > 0.0
+        held_back = self.held_back(self.task.initial_state, self.task.target_state)
+        return bool(committee.leads and committee.lawless) and some and held_back is not None
+
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""
         options = self.options
@@ -251,10 +258,10 @@ class Planner(Judge):
 
     def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
         """Candidates around some genes, without excitation where the one that promises most is wanted."""
-        held_back = self.held_back(self.task.initial_state, self.task.target_state) is not None
+        excited = self.excites(committee)
         drafts = candidates(
             self, self.options, genes, flown, wanted.goal, wanted.number, committee.leads,
-            committee.lawless if held_back else (), committee.untunable,
+            committee.lawless if excited else (), committee.untunable,
         )  # fmt: skip
         drafts = drafts.quiet() if wanted.plain else drafts
         return Comparison(self, self.options, committee, drafts, flown, wanted)

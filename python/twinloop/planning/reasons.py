@@ -25,6 +25,8 @@ class Why:
         exploits: whether the tuned gains are flown as they are.
         plain: whether the test that promises most was wanted.
         repeats: whether it flies the best gains flown again.
+        excited: whether it has an excitation.
+        varied: whether its gains are others than the best ones flown, however close.
         safe: whether every member keeps the envelope with its margin, and under noise.
         disagreement: of the committee, in nats.
         step: at which two members are the furthest apart.
@@ -42,6 +44,8 @@ class Why:
     exploits: bool
     plain: bool
     repeats: bool
+    excited: bool
+    varied: bool
     safe: bool
     disagreement: float
     step: int
@@ -75,13 +79,13 @@ def _what_flies(why: Why, options: PlanningOptions) -> str:
     known = ": they are known to fly" * why.flies
     if why.fared.left:
         known = f", though {why.fared} left the envelope"
-    if why.repeats and why.plain:
-        return f"The best gains flown, again{known}."
-    if why.repeats:
+    if not why.repeats:
+        return ""
+    if why.excited:
         excitation = "a stronger excitation" if why.stronger else "another excitation"
-        change = excitation if options.excitation > 0.0 else "a small variation"
-        return f"The best gains flown, again, with {change}{known}."
-    return ""
+        return f"The best gains flown, again, with {excitation}{known}."
+    variation = ", with a small variation" if why.varied else ""
+    return f"The best gains flown, again{variation}{known}."
 
 
 def _what_it_tells(why: Why, signals: Signals) -> str:
@@ -90,7 +94,10 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     if not why.trusted:
         return "The twin does not follow the flights so far: it cannot say what this one will show."
     if not why.gains_count and why.lawless:
-        return f"{what_stays(why.lawless)[:-1]}, and it flies alike with any other gains than those that answer to it."
+        return (
+            f"{what_stays(why.lawless)[:-1]}, and gains that do not answer to {them(why.lawless)} make no difference on"
+            " it: all stay as flown."
+        )
     if not why.gains_count:
         return "The twin does not know yet what the commands do to the task: it flies alike with any gains."
     if why.exploits:
@@ -105,6 +112,11 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
             f" {why.disagreement / float(log(2.0)):.3g} bits."
         )
     return "The models agree on it: the flight tests what they have in common."
+
+
+def them(names: Sequence[str]) -> str:
+    """The pronoun for some names."""
+    return "them" if len(names) > 1 else "it"
 
 
 def what_stays(lawless: Sequence[str], untunable: Sequence[str] = ()) -> str:

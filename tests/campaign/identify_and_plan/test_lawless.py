@@ -42,9 +42,10 @@ def flown(test, seed, coupled=0.0, authority=0.5):
     return tl.Trajectory(AXES.dt * np.arange(len(states)), np.array(states), np.array(commands))
 
 
-def begun(gains=GAINS, options=BRIEF, signals=AXES, **changes):
+def begun(gains=GAINS, options=BRIEF, signals=AXES, controller=None, **changes):
+    family = controller or tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=gains)
     return tl.Campaign(
-        signals, controller=tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=gains),
+        signals, controller=family,
         initial_state=[0.5, 0.3, 0.0, 0.0], target_state=np.zeros(4), duration=3.0, seed=3, threads=1,
         progress=None, options=options, **changes,
     )  # fmt: skip
@@ -123,6 +124,68 @@ def test_flights_for_the_task_alone_are_excited_until_there_is_a_law():
         campaign.tell(test, flown(test, seed, authority=0.08))
         test = campaign.ask()
         assert "unmoved" in codes(campaign) and np.abs(test.excitation[:, 1]).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "exploits"),
+    [
+        ({}, False),
+        ({"excitation": 0.0}, True),
+        ({"excitation_most": 0.0}, True),
+        ({"hold_back": False}, True),
+    ],
+    ids=repr,
+)
+def test_flights_for_the_task_alone_are_the_best_gains_as_they_are_where_no_such_excitation_is_flown(
+    options, exploits, monkeypatch
+):
+    campaign = begun(goal="control", options=BRIEF | options)
+    test = campaign.test(FIRST)
+    for seed in (60, 61):
+        campaign.tell(test, flown(test, seed, authority=0.08))
+        test = campaign.ask() if seed == 60 else test
+    asked, planner = [], campaign._method.planner
+    propose = planner.propose
+    monkeypatch.setattr(planner, "propose", lambda *given: asked.append(given) or propose(*given))
+    test = campaign.ask()
+    assert "unmoved" in codes(campaign) and [given[5] for given in asked] == [exploits]
+    assert gains_of(test, OF_B) == {name: FIRST[name] for name in OF_B}
+    assert ("a stronger excitation" in test.reason) <= (test.excitation is not None)
+
+
+def test_boxes_around_zero_are_no_way_round_it():
+    """In the middle of such a box a controller answers to nothing."""
+    test = told(gains={name: (-4.0, 4.0) for name in GAINS}, first=FIRST | OF_B).ask()
+    assert gains_of(test, OF_B) == OF_B and test.parameters["a.kp"] > 1.0
+    assert np.abs(test.excitation[:, 1]).max() > 0.1
+
+
+class Crossed:
+    """Two gains on a, one of which moves b, and a trim on b that is always sent."""
+
+    def __init__(self, **gains):
+        self.gains = gains
+
+    def reset(self):
+        """Nothing is remembered."""
+
+    def command(self, reading, target):
+        (a, b, p, q), of = target - reading, self.gains
+        return [of["ka"] * a + of["da"] * p, of["kb"] * b + 0.5 * q + of["cross"] * a + of["trim"]]
+
+
+def test_gains_that_make_no_difference_without_the_law_stay_too():
+    """What they do to b, of which the twin knows nothing, would be left to chance."""
+    boxes = {"ka": (0.0, 4.0), "da": (0.0, 2.0), "kb": (0.0, 4.0), "cross": (-1.0, 4.0), "trim": (-0.5, 0.5)}
+    first = {"ka": 0.3, "da": 0.3, "kb": 0.3, "cross": 0.0, "trim": 0.05}
+    campaign = told(controller=tl.controllers.Custom(Crossed, boxes), first=first)
+    test, best = campaign.ask(), campaign.best_test
+    assert "unmoved" in codes(campaign)
+    for found in (test, best):
+        assert gains_of(found, ("kb", "cross", "trim")) == {
+            name: first[name] for name in ("kb", "cross", "trim")
+        }
+        assert found.parameters["ka"] > 1.0 and "kb, cross and trim stay as flown" in found.reason
 
 
 def test_where_all_gains_answer_to_it_the_best_ones_fly_again_and_nobody_says_that_they_have_no_effect():

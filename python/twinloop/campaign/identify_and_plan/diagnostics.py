@@ -128,8 +128,7 @@ def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
         yield serious(
             "unmoved",
             f"In the twin nothing drives {', '.join(states)}, but the flights show motion that the"
-            " controller reacts to: disturbances hide the effect of the commands. Gains for it cannot be tuned yet:"
-            " they stay as in the best flight.",
+            " controller reacts to: disturbances hide the effect of the commands. Gains for it cannot be tuned yet.",
         )
 
 

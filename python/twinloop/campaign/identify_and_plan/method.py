@@ -36,11 +36,13 @@ from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
 from twinloop.law.ending import ending
-from twinloop.planning.effect import answering, gains_count
+from twinloop.planning.effect import answering, gains_count, without_effect
+from twinloop.planning.excitation import usual_genes
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared, Flown, Proposal
+from twinloop.planning.reasons import them
 from twinloop.planning.scored import Scored
 from twinloop.planning.seen import Seen
 from twinloop.planning.worth import in_vain
@@ -161,11 +163,11 @@ class IdentifyAndPlan:
             return self._asked_of_nobody(book)
         committee, best = self._committee(book), standing.best_flown(book)
         if best is None and committee.lawless:
-            names = enumerated([self.setup.signals.state_names[i] for i in committee.lawless])
+            states = [self.setup.signals.state_names[i] for i in committee.lawless]
             raise NotAvailable(
-                f"Campaign.ask: expected a flown test, or a twin with a law of {names}, found neither: gains that"
-                " answer to that cannot be tuned. Fly a controller that you trust: campaign.test(gains), then"
-                " campaign.tell."
+                f"Campaign.ask: expected a flown test, or a twin with a law of {enumerated(states)}, found neither:"
+                f" gains that answer to {them(states)} cannot be tuned. Fly a controller that you trust:"
+                " campaign.test(gains), then campaign.tell."
             )
         if best is None and not committee.trusted:
             raise NotAvailable(
@@ -177,7 +179,7 @@ class IdentifyAndPlan:
         final = last and self.options.exploit_last and not waits
         flown = self._flown(book, best, tuned)
         # Of what has no law nothing would be learnt without an excitation.
-        exploits = self.setup.goal == "control" and not committee.lawless
+        exploits = self.setup.goal == "control" and not self.planner.excites(committee)
         found = self.planner.propose(
             committee,
             tuned,
@@ -308,7 +310,8 @@ class IdentifyAndPlan:
         )
         if at_once:
             tuned, note = known_gains(self.memory, best)
-            found = choice.between(tuned, best)
+            # They may be of a twin that still had a law of what this one has none of.
+            found = choice.between(tuned if best is None else committee.as_flown(tuned, best.genes), best)
             return replace(found, reason=f"{found.reason}{note}")
         answer = choice.between(self._within_reach(committee, self._gains(book), book), best)
         self.memory = replace(self.memory, best=(book.revision, answer))
@@ -373,7 +376,7 @@ class IdentifyAndPlan:
         borne = slower(TOLERATED)
         flights = without_wrong_readings(latest.flights(book.experiments), self.setup.signals)
         lawless = lawless_states(latest.identified, flights, self.setup)
-        untunable = answering(self.setup.family, lawless, np.atleast_2d(self.setup.target_state)[0])
+        untunable = self._untunable(book, latest, lawless)
         return Committee(
             latest.believed,
             sensors,
@@ -388,6 +391,22 @@ class IdentifyAndPlan:
             lawless,
             untunable,
         )
+
+    def _untunable(self, book: Logbook, latest: Learnt, lawless: Sequence[int]) -> tuple[int, ...]:
+        """Numbers of the gains that answer to states without a law, or make no difference on the committee for that.
+
+        All of them if none is found to answer: the controller answers to such a state in some way.
+        """
+        if not lawless:
+            return ()
+        best, family = standing.best_flown(book), self.setup.family
+        usual = usual_genes(family)
+        beside = usual if best is None else best.genes
+        answer = answering(family, lawless, np.atleast_2d(self.setup.target_state)[0], beside)
+        if not answer:
+            return tuple(range(family.size))
+        idle = (set(without_effect(self.planner, latest.believed, genes)) for genes in (beside, usual))
+        return tuple(sorted({*answer, *set.intersection(*idle)}))
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
         """The best law where what states do ends where flights and the task have been; None where that is off.

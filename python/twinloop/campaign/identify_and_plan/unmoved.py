@@ -17,7 +17,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.law.forms import driven_states
 from twinloop.law.law import Law
-from twinloop.planning.excitation import slopes
+from twinloop.planning.excitation import slopes, usual_genes
 from twinloop.signals import Signals
 
 MOVED = 3.0
@@ -37,8 +37,7 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
     runs = [Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments]
     sensors = np.minimum(identified.sensors(signals.n_x), _at_most(runs, signals))
     target = np.atleast_2d(setup.target_state)[0]
-    middle = np.array([0.5 * (gain.low + gain.high) for gain in setup.family.gains])
-    answered = (slopes(setup.family, middle, target) != 0.0).any(axis=0)
+    answered = (slopes(setup.family, usual_genes(setup.family), target) != 0.0).any(axis=0)
     by_first = {found.chain.states[0]: list(found.chain.states) for found in identified.sums}
     return [
         first
