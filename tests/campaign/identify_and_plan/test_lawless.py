@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from oracles import same_bits
 from twinloop.errors import NotAvailable, NotTrusted
+from twinloop.planning.candidates import candidates
 
 AXES = tl.Signals(
     [
@@ -213,3 +215,31 @@ def test_without_a_flown_test_there_are_no_gains_that_could_stay():
         NotTrusted, match="the twin knows no law of b and q yet, and no gains have completed a flight"
     ):
         _ = campaign.best_test
+
+
+def test_after_an_interruption_gains_of_an_earlier_twin_stay_as_flown_there_too():
+    """They may have been tuned on a twin that still had the law."""
+    campaign = told()
+    campaign.ask()
+    method, best = campaign._method, campaign.experiments[0].test
+    earlier = best.family.genes({**FIRST, "a.kp": 4.0, "a.kd": 1.2, "b.kp": 1.7})
+    method.memory = replace(method.memory, gains=None, asked=replace(method.memory.asked, gains=earlier))
+    found = method.best_test(campaign._book, at_once=True)
+    assert found.parameters["a.kp"] == 4.0
+    assert gains_of(found, OF_B) == {name: FIRST[name] for name in OF_B}
+
+
+def test_without_an_excitation_a_flight_that_is_flown_again_varies_the_others_alone():
+    campaign = told(options=BRIEF | {"excitation": 0.0})
+    campaign.ask()
+    method, book = campaign._method, campaign._book
+    best = campaign.experiments[0].test
+    committee = method._committee(book)
+    drafts = candidates(
+        method.planner, campaign.options, best.genes, method._flown(book, best, best.genes), "both", 1, True,
+        committee.lawless, committee.untunable,
+    )  # fmt: skip
+    again = drafts.genes[drafts.repeats :]
+    held = np.isin(np.arange(best.family.size), committee.untunable)
+    assert same_bits(again[:, held], np.tile(best.genes[held], (len(again), 1)))
+    assert (again[:, ~held] != best.genes[~held]).any(axis=1).all() and not drafts.excitation.any()
