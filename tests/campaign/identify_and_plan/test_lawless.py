@@ -93,14 +93,13 @@ def test_they_stay_as_flown_until_a_stronger_excitation_has_shown_the_law():
 
 @pytest.mark.parametrize(
     ("limited", "held_by"),
-    [("abpq", {"b", "q"}), ("b", {"b", "q"}), ("ap", {"a", "p"}), ("", None)],
-    ids=repr,
+    [("abpq", "bq"), ("b", "bq"), ("ap", "ap"), ("", None)],
 )
 def test_states_without_a_law_hold_their_excitation_back_or_all_that_have_an_envelope(limited, held_by):
     """A rate has room as long as what it is the rate of has. Where nothing would, no such excitation is flown."""
     states = [state if state.name in limited else replace(state, envelope=None) for state in AXES.states]
     test = told(signals=replace(AXES, states=states)).ask()
-    assert (test.hold_back and set(test.hold_back.ranges(AXES))) == held_by
+    assert (test.hold_back and "".join(sorted(test.hold_back.ranges(AXES)))) == held_by
     assert (np.abs(test.excitation[:, 1]).max() > 0.1) == (held_by is not None)
 
 
