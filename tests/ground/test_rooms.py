@@ -14,7 +14,7 @@ MODULES = {
 
 # A file that is added here may be imported from outside its room; a file that no one imports any more leaves the list.
 FRONTS = {
-    "_experiment": "envelope hold_back limits replay",
+    "_experiment": "envelope hold_back limits rates replay",
     "_ground": (
         "arrays elementary loading rounding showing side_by_side slopes steps streams texts times values versions"
         " writing"

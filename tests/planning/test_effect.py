@@ -63,17 +63,23 @@ ARM = tl.Signals(
 )
 A, B, P, Q = range(4)
 BOX = (0.0, 5.0)
-THREE = {f"{axis}.{kind}": BOX for axis in "ab" for kind in ("kp", "ki", "kd")}
+
+
+def pid(box, rates=("p", "q")):
+    gains = {f"{axis}.{kind}": box for axis in "ab" for kind in ("kp", "ki", "kd")}
+    return tl.controllers.PID(axes=list(zip("ab", rates, strict=True)), gains=gains)
+
+
+def cascade(box):
+    gains = {f"{axis}.kp": box for axis in "ab"}
+    gains |= {f"{rate}.{kind}": box for rate in "pq" for kind in ("kp", "ki", "kd")}
+    return tl.controllers.Cascade(axes=[("a", "p"), ("b", "q")], gains=gains)
+
+
 LAWS = {
-    "pid": tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=THREE),
-    "no-rates": tl.controllers.PID(axes=[("a", None), ("b", None)], gains=THREE),
-    "cascade": tl.controllers.Cascade(
-        axes=[("a", "p"), ("b", "q")],
-        gains={
-            **{f"{axis}.kp": BOX for axis in "ab"},
-            **{f"{rate}.{kind}": BOX for rate in "pq" for kind in ("kp", "ki", "kd")},
-        },
-    ),
+    "pid": pid(BOX),
+    "no-rates": pid(BOX, rates=(None, None)),
+    "cascade": cascade(BOX),
     "feedback": tl.controllers.StateFeedback(
         states=["a", "b", "q"], gains={name: (-5.0, 5.0) for name in "abq"}
     ),
@@ -99,41 +105,41 @@ LAWS = {
 def test_gains_answer_to_a_state_if_what_is_sent_while_it_is_off_depends_on_them(law, states, names):
     """Over two periods, so that rates that are differences, and integrals, are answered too."""
     family = LAWS[law].bind(ARM)
-    found = answering(family, states, np.array([0.3, -0.2, 0.0, 0.0]), usual_genes(family))
-    assert sorted(family.names[i] for i in found) == sorted(names.split())
-
-
-def large(law, most):
-    """The names of the gains that answer to b where they may be as large as this."""
-    box = (0.0, most)
-    gains = {name: box for name in THREE}
-    if law == "cascade":
-        gains = {f"{axis}.kp": box for axis in "ab"} | {
-            f"{rate}.{kind}": box for rate in "pq" for kind in ("kp", "ki", "kd")
-        }
-        family = tl.controllers.Cascade(axes=[("a", "p"), ("b", "q")], gains=gains)
-    else:
-        family = tl.controllers.PID(axes=[("a", law), ("b", law and "q")], gains=gains)
-    family = family.bind(ARM)
-    return [family.names[i] for i in answering(family, [B], np.zeros(4), usual_genes(family))]
+    found = answered(family, states, usual_genes(family), (0.3, -0.2, 0.0, 0.0))
+    assert sorted(found) == sorted(names.split())
 
 
 @pytest.mark.parametrize("most", [1e-3, 1.0, 1e2, 1e4])
 def test_gains_that_saturate_their_command_answer_too(most):
     """Commands are within ±9; with 1e4 a ten-thousandth of a radian asks for more."""
-    assert large("p", most) == ["b.kp", "b.ki"]
-    assert large(None, most) == ["b.kp", "b.ki", "b.kd"]
-    assert large("cascade", most) == ["b.kp", "q.kp", "q.ki"]
+    box = (0.0, most)
+    expected = {
+        pid(box): "b.kp b.ki",
+        pid(box, rates=(None, None)): "b.kp b.ki b.kd",
+        cascade(box): "b.kp q.kp q.ki",
+    }
+    for law, names in expected.items():
+        family = law.bind(ARM)
+        assert answered(family, [B], usual_genes(family)) == names.split()
 
 
-class Trimmed:
-    """A law in Python: a trim that is always sent, and a gain for each axis."""
+def answered(family, states, beside, target=(0.0, 0.0, 0.0, 0.0)):
+    """The names of the gains that answer to some states."""
+    return [family.names[i] for i in answering(family, states, np.array(target), beside)]
+
+
+class Law:
+    """What every law in Python has."""
 
     def __init__(self, **gains):
         self.gains = gains
 
     def reset(self):
         """Nothing is remembered."""
+
+
+class Trimmed(Law):
+    """A law in Python: a trim that is always sent, and a gain for each axis."""
 
     def command(self, reading, target):
         off = target - reading
@@ -142,25 +148,14 @@ class Trimmed:
 
 def test_a_gain_that_is_sent_whatever_the_states_do_answers_to_none():
     family = tl.controllers.Custom(Trimmed, {name: (-1.0, 1.0) for name in ("trim", "ka", "kb")}).bind(ARM)
-    assert [family.names[i] for i in answering(family, [B], np.zeros(4), usual_genes(family))] == ["kb"]
+    assert answered(family, [B], usual_genes(family)) == ["kb"]
     # The rate of a that its target asks for is answered at the target, too.
-    moving = np.array([0.0, 0.0, 0.4, 0.0])
-    pid = LAWS["pid"].bind(ARM)
-    assert [pid.names[i] for i in answering(pid, [B, Q], moving, usual_genes(pid))] == [
-        "b.kp",
-        "b.ki",
-        "b.kd",
-    ]
+    axes, moving = LAWS["pid"].bind(ARM), (0.0, 0.0, 0.4, 0.0)
+    assert answered(axes, [B, Q], usual_genes(axes), moving) == ["b.kp", "b.ki", "b.kd"]
 
 
-class Banded:
+class Banded(Law):
     """A dead band around b's target, and a trim that saturates the command wherever it is large."""
-
-    def __init__(self, **gains):
-        self.gains = gains
-
-    def reset(self):
-        """Nothing is remembered."""
 
     def command(self, reading, target):
         off = target - reading
@@ -173,22 +168,17 @@ def test_a_dead_band_and_a_command_that_saturates_at_the_target_hide_no_gain():
     assert usual[0] > 9.0  # the usual controller sends the bound of its command, whatever b does
     flown = np.array([0.0, 0.5])
     # The trim, too: a large one saturates the command, and leaves b unanswered.
-    assert [family.names[i] for i in answering(family, [B], np.zeros(4), flown)] == ["trim", "kb"]
-    assert answering(family, [A], np.zeros(4), flown) == ()
+    assert answered(family, [B], flown) == ["trim", "kb"]
+    assert answered(family, [A], flown) == []
 
 
 def test_boxes_around_zero_hide_nothing_either():
-    gains = {name: (-4.0, 4.0) for name in THREE}
-    family = tl.controllers.PID(axes=[("a", "p"), ("b", "q")], gains=gains).bind(ARM)
+    family = pid((-4.0, 4.0)).bind(ARM)
     assert not slopes(family, family.from_unit(np.full(6, 0.5)), np.zeros(4)).any()
     vectors, answers = directions_for(family, np.zeros(6), np.zeros(4), [B, Q])
     np.testing.assert_allclose(np.abs(vectors), [[0.0, 1.0]], atol=1e-12)
     assert answers.tolist() == [0.0]
-    assert [family.names[i] for i in answering(family, [B, Q], np.zeros(4), np.zeros(6))] == [
-        "b.kp",
-        "b.ki",
-        "b.kd",
-    ]
+    assert answered(family, [B, Q], np.zeros(6)) == ["b.kp", "b.ki", "b.kd"]
 
 
 def test_gains_without_an_effect_are_those_that_change_no_flight():
@@ -196,16 +186,9 @@ def test_gains_without_an_effect_are_those_that_change_no_flight():
     beside = usual_genes(planner.family)
     assert without_effect(planner, [IDLE], beside) == (0, 1, 2)
     assert without_effect(planner, [IDLE, MOVED], beside) == without_effect(planner, [MOVED], beside) == ()
-    one = replace_task(planner, start=np.zeros(2))
+    planner.task = replace(planner.task, initial_state=np.zeros(2))
     # At rest on the target only noise and the integral of nothing are answered: no gain makes a difference.
-    assert without_effect(one, [MOVED], beside) == (0, 1, 2)
-
-
-def replace_task(planner, start):
-    """The same planner for flights that begin elsewhere."""
-    other = planner_of(KNOWN)
-    other.task = replace(planner.task, initial_state=start)
-    return other
+    assert without_effect(planner, [MOVED], beside) == (0, 1, 2)
 
 
 def test_where_no_controller_of_a_family_answers_there_is_no_direction_and_nothing_is_added():
@@ -218,7 +201,7 @@ def test_where_no_controller_of_a_family_answers_there_is_no_direction_and_nothi
 
 def test_directions_that_the_flown_gains_have_no_use_for_are_those_of_the_middle_of_the_box():
     family = LAWS["pid"].bind(ARM)
-    genes = family.genes({**{name: 0.5 for name in THREE}, "b.kp": 0.0, "b.ki": 0.0, "b.kd": 0.0})
+    genes = family.genes({name: 0.5 * (name[0] == "a") for name in family.names})
     vectors, answers = directions_for(family, genes, np.zeros(4), [B, Q])
     np.testing.assert_allclose(np.abs(vectors), [[0.0, 1.0]], atol=1e-12)
     assert answers.tolist() == [0.0]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
+from twinloop._experiment.rates import rates_of
 from twinloop._ground.arrays import Floats
 from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput
@@ -129,7 +130,8 @@ class HoldBack(Value, Recorded, kind="hold_back"):
         most = (1.0 - LEFT) * rooms
         if swing is not None:
             place = signals.state_names.index
-            for rate, of in _rates(signals).items():
+            # The room of a rate depends on that of what it is the rate of.
+            for rate, of in rates_of(signals).items():
                 rooms[place(rate)] = np.minimum(rooms[place(rate)], rooms[place(of)] / swing)
         rooms[others] = np.inf
         # From the task's farthest points outwards: where the excitation is nothing, and where it begins to be less.
@@ -141,25 +143,6 @@ class HoldBack(Value, Recorded, kind="hold_back"):
         begins = np.where(counts, ends - (ENDS - BEGINS) * np.where(counts, rooms, 0.0), np.inf)
         full, none = (farthest + outwards * share for share in (begins, ends))
         return cls(full, none) if np.isfinite(none).any() else None
-
-
-def _rates(signals: Signals) -> dict[str, str]:
-    """Of what each state is the rate, by name: its declared derivative, or a body rate about the angle's axis.
-
-    From integrals to derivatives, in whatever order the states are declared: the room of a rate depends on the room
-    that is left to what it is the rate of.
-    """
-    declared = {
-        state.name: state.derivative_of for state in signals.states if state.derivative_of is not None
-    }
-    body = signals.kinematics
-    left = declared if body is None else {**dict(zip(body.rates, body.angles, strict=True)), **declared}
-    ordered: dict[str, str] = {}
-    while left:
-        # Rates of what is no rate itself, or is in order already; all, should an angle derive from its own body rate.
-        ordered |= {rate: of for rate, of in left.items() if of not in left} or left
-        left = {rate: of for rate, of in left.items() if rate not in ordered}
-    return ordered
 
 
 def _rooms(state: State, farthest: Floats) -> Floats:

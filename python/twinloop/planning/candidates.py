@@ -72,7 +72,7 @@ def candidates(
         leads: whether the committee can say where a flight leads; otherwise it is held back as a first one is.
         lawless: states of which it knows no law: their commands are excited as in a first flight. None where nothing
             would hold that back.
-        untunable: numbers of the gains that answer to those: they stay as in the best flight.
+        untunable: numbers of the gains that cannot be tuned for that: they stay as in the best flight.
 
     Returns:
         The candidates.
@@ -93,21 +93,20 @@ def candidates(
         places[way:] += back * (family.to_unit(flown.best) - place)
     genes = family.from_unit(places)
     genes[0] = tuned
-    kept = list(untunable)
-    genes[:, kept] = flown.best[kept]
     genes[count - again :] = flown.best
     if options.excitation <= 0.0:
         # The same flight once more would tell nothing: gains close by.
         near = family.to_unit(flown.best) + 0.3 * options.nearness * stream.normals(again, family.size)
         genes[count - again :] = family.from_unit(near)
-        genes[:, kept] = flown.best[kept]
+    kept = list(untunable)
+    genes[:, kept] = flown.best[kept]
     excitation = np.zeros((count, steps, judge.signals.n_u))
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:
         # Gains that have flown bear more of it than before, and once more the same would tell little.
         stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
         along = directions_of(judge, flown.best) if options.hold_back and not leads else None
-        target = np.atleast_2d(judge.task.target_state)[0]
+        target = judge.task.first_target
         beside = directions_for(judge.family, flown.best, target, lawless) if leads and lawless else None
         for i in range(1, count):
             repeated = i >= count - again
@@ -139,7 +138,7 @@ def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> En
 
 def directions_of(judge: Judge, genes: Floats) -> tuple[Floats, Floats]:
     """`directions` of the controller with some gains (size,), around the target of the campaign's task."""
-    return directions(judge.family, genes, np.atleast_2d(judge.task.target_state)[0])
+    return directions(judge.family, genes, judge.task.first_target)
 
 
 def unknown_excitation(

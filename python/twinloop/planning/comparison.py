@@ -94,7 +94,7 @@ class Comparison:
             safe=safe,
             disagreement=disagreement,
             gain=self.gain,
-            reason=reason(self._why(chosen, safe, disagreement), self.judge.signals, self.options),
+            reason=reason(self._why(chosen, safe, disagreement), self.judge.signals),
         )
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Effect: whether gains make a difference on a twin, which of them make none, and which answer to some states."""
+"""Effect: whether gains make a difference on a twin, and which cannot be tuned where it has no law of a state."""
 
 from __future__ import annotations
 
@@ -40,6 +40,32 @@ def gains_count(judge: Judge, members: Sequence[_core.Model], untunable: Sequenc
     return bool((~np.isfinite(qualities) | (qualities != qualities[:, :, :1])).any())
 
 
+def untunable_gains(
+    judge: Judge, members: Sequence[_core.Model], lawless: Sequence[int], flown: Floats | None
+) -> tuple[int, ...]:
+    """Numbers of the gains that answer to states of which members have no law, or make no difference on them for that.
+
+    All of them if none is found to answer: the controller answers to such a state in some way.
+
+    Args:
+        judge: of the campaign.
+        members: of a committee.
+        lawless: states that move, of which they have no law; none: all gains can be tuned.
+        flown: the best gains flown (size,); None: none were.
+    """
+    if not lawless:
+        return ()
+    usual = usual_genes(judge.family)
+    beside = [usual] if flown is None else [usual, flown]
+    answer = {
+        gain for genes in beside for gain in answering(judge.family, lawless, judge.task.first_target, genes)
+    }
+    if not answer:
+        return tuple(range(judge.family.size))
+    idle = set.intersection(*(set(without_effect(judge, members, genes)) for genes in beside))
+    return tuple(sorted(answer | idle))
+
+
 def without_effect(judge: Judge, members: Sequence[_core.Model], beside: Floats) -> tuple[int, ...]:
     """Numbers of the gains that alone change no flight of the task on any member, to the bit, at either end.
 
@@ -66,17 +92,11 @@ def answering(family: Family, states: Sequence[int], target: Floats, beside: Flo
         family: of the controllers.
         states: that go off, one after another, for two periods: their rates and integrals are answered, too.
         target: from which they go off (n_x,).
-        beside: gains (size,) of a controller that is asked beside the usual one of the family.
+        beside: gains (size,) beside which each is moved.
     """
-    places = [family.to_unit(usual_genes(family)), family.to_unit(beside)] if states else []
-    found = [_answering(family, states, target, place) for place in places]
-    return tuple(sorted({gain for each in found for gain in each}))
-
-
-def _answering(family: Family, states: Sequence[int], target: Floats, beside: Floats) -> list[int]:
-    """The same beside one controller, whose gains are at these places in their box (size,)."""
-    places = np.tile(beside, (family.size + 1, 1))
-    places[np.arange(family.size), np.arange(family.size)] = np.where(beside < FAR, 1.0, 0.0)
+    place = family.to_unit(beside)
+    places = np.tile(place, (family.size + 1, 1))
+    places[np.arange(family.size), np.arange(family.size)] = np.where(place < FAR, 1.0, 0.0)
     controllers = [family.controller(genes) for genes in family.from_unit(places)]
     least = ROUNDING * np.array([command.size for command in family.signals.commands])
     targets = np.tile(target, (3, 1))
@@ -86,10 +106,9 @@ def _answering(family: Family, states: Sequence[int], target: Floats, beside: Fl
     for state, share in itertools.product(states, OFF):
         readings = targets.copy()
         readings[1:] = off_by(family.signals, state, target, share)
-        *moved, usual = (
+        *moved, unmoved = (
             controller.commands(readings, targets) - sent
             for controller, sent in zip(controllers, there, strict=True)
         )
-        answers |= [(np.abs(sent - usual) > least).any() for sent in moved]
-    numbers: list[int] = np.flatnonzero(answers).tolist()
-    return numbers
+        answers |= [(np.abs(sent - unmoved) > least).any() for sent in moved]
+    return tuple(np.flatnonzero(answers).tolist())

@@ -35,6 +35,12 @@ class Task:
     target_state: Floats
     steps: int
 
+    @property
+    def first_target(self) -> Floats:
+        """Where it leads at its beginning (n_x,)."""
+        first: Floats = np.atleast_2d(self.target_state)[0]
+        return first
+
 
 @dataclass(frozen=True, eq=False)
 class Committee:
@@ -52,7 +58,7 @@ class Committee:
         ending: the best one where what states do ends where flights have been; None where that is not asked.
         gains_count: whether gains that can be tuned make a difference on the members.
         lawless: states that move, of which no law is known.
-        untunable: numbers of the gains that answer to those.
+        untunable: numbers of the gains that cannot be tuned for that.
     """
 
     members: Sequence[_core.Model]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from twinloop._ground.elementary import log
 from twinloop._ground.texts import enumerated, two_digits
 from twinloop.planning.proposal import Fared
-from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
 
 
@@ -33,7 +32,7 @@ class Why:
         state: in which they are.
         members: numbers of the two.
         lawless: names of states of which no law is known.
-        untunable: names of the gains that answer to those.
+        untunable: names of the gains that cannot be tuned for that.
     """
 
     trusted: bool
@@ -55,15 +54,14 @@ class Why:
     untunable: tuple[str, ...] = ()
 
 
-def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
+def reason(why: Why, signals: Signals) -> str:
     """Why this test.
 
     Args:
         why: what there is to say.
         signals: of the system.
-        options: of the planning.
     """
-    sentences = [_what_flies(why, options), _what_it_tells(why, signals)]
+    sentences = [_what_flies(why), _what_it_tells(why, signals)]
     if why.trusted and why.gains_count and why.lawless:
         sentences.append(what_stays(why.lawless, () if why.repeats else why.untunable))
     if not why.safe:
@@ -74,7 +72,7 @@ def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _what_flies(why: Why, options: PlanningOptions) -> str:
+def _what_flies(why: Why) -> str:
     """That the best gains flown fly again; nothing where others do."""
     known = ": they are known to fly" * why.flies
     if why.fared.left:
@@ -96,7 +94,7 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     if not why.gains_count and why.lawless:
         return (
             f"{what_stays(why.lawless)[:-1]}, and gains that do not answer to {them(why.lawless)} make no difference on"
-            " it: all stay as flown."
+            " the twin: all stay as flown."
         )
     if not why.gains_count:
         return "The twin does not know yet what the commands do to the task: it flies alike with any gains."

@@ -94,13 +94,13 @@ class Choice:
         if not refused:
             share = f"{100 * better:.3g} %"
             found = f"by {self._more} in {share} of its predictions"
-            reason = f"Tuned on the twin: better than the best flown gains {found}.{self._stays}"
+            reason = f"Tuned on the twin: better than the best flown gains {found}."
             if not flies:
                 reason = (
                     "Tuned on the twin: no model predicts that they leave the envelope, as the best flown gains"
                     " did."
                 )
-            return self._tuned(tuned, judged, recorded, reason)
+            return self._tuned(tuned, judged, recorded, f"{reason}{self._stays}")
         reason = f"The best gains flown: {refused}."
         if not flies:
             reason += " They left the envelope when they flew."

@@ -36,8 +36,7 @@ from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
 from twinloop.law.ending import ending
-from twinloop.planning.effect import answering, gains_count, without_effect
-from twinloop.planning.excitation import usual_genes
+from twinloop.planning.effect import gains_count, untunable_gains
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -376,7 +375,9 @@ class IdentifyAndPlan:
         borne = slower(TOLERATED)
         flights = without_wrong_readings(latest.flights(book.experiments), self.setup.signals)
         lawless = lawless_states(latest.identified, flights, self.setup)
-        untunable = self._untunable(book, latest, lawless)
+        best = standing.best_flown(book)
+        flown = None if best is None else best.genes
+        untunable = untunable_gains(self.planner, latest.believed, lawless, flown)
         return Committee(
             latest.believed,
             sensors,
@@ -391,22 +392,6 @@ class IdentifyAndPlan:
             lawless,
             untunable,
         )
-
-    def _untunable(self, book: Logbook, latest: Learnt, lawless: Sequence[int]) -> tuple[int, ...]:
-        """Numbers of the gains that answer to states without a law, or make no difference on the committee for that.
-
-        All of them if none is found to answer: the controller answers to such a state in some way.
-        """
-        if not lawless:
-            return ()
-        best, family = standing.best_flown(book), self.setup.family
-        usual = usual_genes(family)
-        beside = usual if best is None else best.genes
-        answer = answering(family, lawless, np.atleast_2d(self.setup.target_state)[0], beside)
-        if not answer:
-            return tuple(range(family.size))
-        idle = (set(without_effect(self.planner, latest.believed, genes)) for genes in (beside, usual))
-        return tuple(sorted({*answer, *set.intersection(*idle)}))
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:
         """The best law where what states do ends where flights and the task have been; None where that is off.

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinloop._experiment.rates import rates_of
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
@@ -51,28 +52,19 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
 def lawless_states(
     identified: Identified, experiments: Sequence[Experiment], setup: Setup
 ) -> tuple[int, ...]:
-    """Such states, their integrals, and the angles that they turn.
+    """Such states, and all that they are the rates of: what moves with them has no law either.
 
     Args:
         identified: with the model.
         experiments: that it was learnt from.
         setup: of the campaign.
     """
-    unmoved = unmoved_states(identified, experiments, setup)
-    chains = (found.chain.states for found in identified.sums if found.chain.states[0] in unmoved)
-    return tuple(sorted({state for chain in chains for state in chain} | _turned(unmoved, setup.signals)))
-
-
-def _turned(rates: Sequence[int], signals: Signals) -> set[int]:
-    """Angles of a rigid body that turn with some of its rates, about the same axes."""
-    body, names = signals.kinematics, signals.state_names
-    if body is None:
-        return set()
-    return {
-        names.index(angle)
-        for angle, rate in zip(body.angles, body.rates, strict=True)
-        if names.index(rate) in rates
-    }
+    names = setup.signals.state_names
+    found = {names[state] for state in unmoved_states(identified, experiments, setup)}
+    for rate, of in reversed(rates_of(setup.signals).items()):
+        if rate in found:
+            found.add(of)
+    return tuple(place for place, name in enumerate(names) if name in found)
 
 
 def _at_most(runs: Sequence[Run], signals: Signals) -> Floats:
