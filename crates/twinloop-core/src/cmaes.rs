@@ -6,7 +6,7 @@
 //! search elsewhere. Here they are summed in one order.
 
 use crate::error::{Result, invalid};
-use crate::linear_algebra::Eigen;
+use crate::linear_algebra::{Eigen, ascending};
 use crate::rng::Unit;
 
 /// A range of values, beside the largest of them, below which nothing is left to be gained.
@@ -161,8 +161,7 @@ impl CmaEs {
     /// The search that knows the values of a generation's points; only their order counts.
     pub fn tell(&self, points: &[Vec<f64>], values: &[f64]) -> Result<Self> {
         self.check(points, values)?;
-        let mut order: Vec<usize> = (0..values.len()).collect();
-        order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
+        let order = ascending(values);
         let s = &self.strategy;
         let n = self.mean.len();
         let steps: Vec<Vec<f64>> = order

@@ -57,8 +57,8 @@ pub fn vector(array: &Vector<'_>) -> Vec<f64> {
     numbers(array.as_array())
 }
 
-/// The rows of a matrix that must have `columns` columns.
-pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f64>>> {
+/// A matrix that must have `columns` columns.
+fn of_width<'a>(name: &str, array: &'a Matrix<'_>, columns: usize) -> Result<ArrayView<'a, f64, Ix2>> {
     let array = array.as_array();
     if array.ncols() != columns {
         return Err(misuse(format!(
@@ -67,7 +67,17 @@ pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f6
             array.ncols()
         )));
     }
-    Ok(array.outer_iter().map(numbers).collect())
+    Ok(array)
+}
+
+/// The rows of a matrix that must have `columns` columns.
+pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f64>>> {
+    Ok(of_width(name, array, columns)?.outer_iter().map(numbers).collect())
+}
+
+/// The same, row after row.
+pub fn row_after_row(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<f64>> {
+    Ok(numbers(of_width(name, array, columns)?))
 }
 
 /// The rows of a matrix that may be left out; none then.

@@ -8,7 +8,7 @@ use twinloop_core::{
     Annealing, Chain, Found, Gram, Leftover, Noise, Record, Regression, Solution, search_all,
 };
 
-use crate::arrays::{Matrix, Vector, finite, rows, to_matrix, to_vector, vector};
+use crate::arrays::{Matrix, Vector, finite, row_after_row, to_matrix, to_vector, vector};
 use crate::error::{Result, given, misuse};
 use crate::rng::Name;
 use crate::workers::{PyWorkers, or_default};
@@ -38,7 +38,7 @@ impl PyRegression {
         let features = records.first().map_or(0, |(_, _, start, _, _)| start.as_array().ncols());
         let record = |(measured, weights, start, middle, end): &RecordArrays<'_>| {
             let flat = |matrix: &Matrix<'_>, columns| -> Result<Vec<f64>> {
-                let found = rows("record", matrix, columns)?.concat();
+                let found = row_after_row("record", matrix, columns)?;
                 finite("record", &found)?;
                 Ok(found)
             };
@@ -157,7 +157,7 @@ impl PyGram {
 
     /// With more rows: features, and a reading at the end.
     fn with_rows(&self, rows: Matrix<'_>) -> Result<Self> {
-        let flat = crate::arrays::rows("rows", &rows, self.0.features + 1)?.concat();
+        let flat = row_after_row("rows", &rows, self.0.features + 1)?;
         finite("rows", &flat)?;
         Ok(Self(Arc::new(Gram::clone(&self.0).with_rows(&flat))))
     }

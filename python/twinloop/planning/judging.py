@@ -263,6 +263,41 @@ class Judge:
         )  # fmt: skip
         return Judged(values, usages)
 
+    def judge_in_turn(
+        self, members: Sequence[_core.Model], genes: Floats, sds: Floats, draws: int, disturbances: Floats | None
+    ) -> Judged:
+        """Flies candidates under each draw on one of the members, in turn: they all count alike, at the price of one.
+
+        What each draw does is nearly the same on all members, so to fly all draws on all of them tells hardly more.
+
+        Args:
+            members: that judge.
+            genes: of K candidates.
+            sds: of each state's sensor (n_x,).
+            draws: of the noise; where there are fewer than members, all members fly all of them.
+            disturbances: of each draw (draws, n, n_x); None: nothing disturbs.
+
+        Returns:
+            Qualities of the true states, and usages, as of one member.
+        """
+        if draws < len(members):
+            return self.judge(members, genes, sds, draws, disturbances=disturbances)
+        noise = self.noise(sds, draws, reports_of(members[0], self.signals.n_x))
+        flights, every = self.flights(genes, None, None), len(members)
+
+        def drawn(every_draw: Floats | None, number: int) -> Floats | None:
+            return None if every_draw is None else every_draw[number::every]
+
+        found = [
+            qualities(
+                [member], flights, self.quality.engine, self.signals,
+                noise=drawn(noise, i), disturbances=drawn(disturbances, i), workers=self.workers,
+            )
+            for i, member in enumerate(members)
+        ]  # fmt: skip
+        values, usages = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        return Judged(values, usages)
+
     def judge_within(
         self,
         bounds: Floats,

@@ -128,12 +128,12 @@ class Planner(Judge):
         # What is wanted is the best mean in the disturbances that flights meet, not in calm.
         met = self.disturbances(committee, draws)
 
-        first = float(self.judge(members, known[np.newaxis], sds, draws, disturbances=met).mean[0])
+        first = float(self.judge_in_turn(members, known[np.newaxis], sds, draws, met).mean[0])
         unit = first if np.isfinite(first) else 0.0
 
         def score(asked: Floats) -> Floats:
             genes = committee.as_flown(asked, known)
-            judged = self.judge(members, genes, sds, draws, disturbances=met)
+            judged = self.judge_in_turn(members, genes, sds, draws, met)
             lost, usage = judged.lost, judged.finite.worst_usage
             if limiting:
                 delayed = self.judge(limiting, genes, sds, draws)

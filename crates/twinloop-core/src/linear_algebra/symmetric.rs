@@ -1,5 +1,6 @@
 //! Eigenvalues and eigenvectors of a small symmetric matrix, by Jacobi's rotations in a fixed order.
 
+use super::ascending;
 use crate::error::{Result, invalid};
 
 /// Rounds over all pairs at most; each one squares what is left, so that ten are many.
@@ -34,8 +35,8 @@ impl Eigen {
                 break;
             }
         }
-        let mut places: Vec<usize> = (0..order).collect();
-        places.sort_by(|&i, &j| a[i * order + i].total_cmp(&a[j * order + j]));
+        let diagonal: Vec<f64> = (0..order).map(|i| a[i * order + i]).collect();
+        let places = ascending(&diagonal);
         Self {
             values: places.iter().map(|&i| a[i * order + i]).collect(),
             vectors: places.iter().flat_map(|&i| v[i * order..][..order].to_vec()).collect(),

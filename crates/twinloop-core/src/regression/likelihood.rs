@@ -1,45 +1,118 @@
 //! How likely residuals are under given noise, and the noise under which they are most likely.
 
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
 use super::chain::{Chain, LONGEST, Motion};
 use super::gram::Record;
 use super::noise::Noise;
-use super::whitening::Whitening;
+use super::whitening::{Linear, Whitening};
 
 /// −2 log of the likelihood, up to a constant, of the records' residuals ((n + 1) × states each) if only noise made them.
 pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noise: &Noise) -> f64 {
-    // Loops of a known length are faster.
-    let squares = match chain.states {
-        1 => squares::<1>,
-        2 => squares::<2>,
-        3 => squares::<3>,
-        _ => squares::<LONGEST>,
+    // Loops of a known length are faster; long chains are rare.
+    let (several, one): (Squares, Squares) = match chain.states {
+        1 => (squares::<1, Several>, squares::<1, f64>),
+        2 => (squares::<2, Several>, squares::<2, f64>),
+        3 => (squares::<3, Several>, squares::<3, Several>),
+        _ => (squares::<LONGEST, Several>, squares::<LONGEST, Several>),
     };
-    let mut total = 0.0;
-    for (whitening, residual) in Record::whitenings(chain, records, noise).iter().zip(residuals) {
-        total = squares(chain, whitening, residual, total + whitening.log_determinant);
+    let whitenings = Record::whitenings(chain, records, noise);
+    let (mut total, mut from) = (0.0, 0);
+    while let Some(whitening) = whitenings.get(from) {
+        // A step waits for the one before it, but not for those of other records.
+        let alike = whitenings[from..].iter().take(AT_ONCE).take_while(|other| Arc::ptr_eq(whitening, other));
+        let records = alike.count();
+        total += records as f64 * whitening.log_determinant;
+        total += if records == 1 { one } else { several }(chain, whitening, &residuals[from..][..records]);
+        from += records;
     }
     total
 }
 
-/// A sum and the squares of a record's whitened residuals.
-fn squares<const D: usize>(chain: &Chain, whitening: &Whitening, residual: &[f64], start: f64) -> f64 {
-    let mut total = start;
+/// Records that are whitened at once.
+const AT_ONCE: usize = 4;
+
+/// A number of each of several records.
+#[derive(Clone, Copy)]
+struct Several([f64; AT_ONCE]);
+
+impl Add for Several {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
+    }
+}
+
+impl Mul<f64> for Several {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f64) -> Self {
+        Self(self.0.map(|number| number * factor))
+    }
+}
+
+/// Numbers of records, of one or of each of several.
+trait Numbers: Linear {
+    /// The numbers of records, in their order; 0 where there is none.
+    fn of(numbers: impl Fn(usize) -> f64, records: usize) -> Self;
+    /// Each with its square added to another's.
+    fn with_square(self, of: Self) -> Self;
+    /// Their sum.
+    fn sum(self) -> f64;
+}
+
+impl Numbers for f64 {
+    #[inline(always)]
+    fn of(numbers: impl Fn(usize) -> f64, _: usize) -> Self {
+        numbers(0)
+    }
+    #[inline(always)]
+    fn with_square(self, of: Self) -> Self {
+        self + of * of
+    }
+    fn sum(self) -> f64 {
+        self
+    }
+}
+
+impl Numbers for Several {
+    #[inline(always)]
+    fn of(numbers: impl Fn(usize) -> f64, records: usize) -> Self {
+        Self(std::array::from_fn(|i| if i < records { numbers(i) } else { 0.0 }))
+    }
+    #[inline(always)]
+    fn with_square(self, of: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + of.0[i] * of.0[i]))
+    }
+    fn sum(self) -> f64 {
+        self.0.iter().sum()
+    }
+}
+
+/// Sum of the squares of the whitened residuals of records that share a filter.
+type Squares = fn(&Chain, &Whitening, &[Vec<f64>]) -> f64;
+
+fn squares<const D: usize, T: Numbers>(chain: &Chain, whitening: &Whitening, residuals: &[Vec<f64>]) -> f64 {
     let motion = Motion { states: D, ..chain.motion() };
-    let mut state = vec![0.0; whitening.inner];
-    for (k, residual) in residual.as_chunks::<D>().0.iter().enumerate() {
-        let mut innovation = [0.0; D];
-        for i in 0..D {
-            innovation[i] = residual[i] - state[i];
+    let nothing = T::of(|_| 0.0, residuals.len());
+    let (mut total, mut state) = (nothing, [nothing; LONGEST + 1]);
+    let state = &mut state[..whitening.inner];
+    for k in 0..residuals[0].len() / D {
+        let mut innovation = [nothing; D];
+        for (i, innovation) in innovation.iter_mut().enumerate() {
+            *innovation = T::of(|record| residuals[record][k * D + i], residuals.len()) + state[i] * -1.0;
         }
-        let (mut white, mut correction) = ([0.0; D], [0.0; LONGEST + 1]);
+        let (mut white, mut correction) = ([nothing; D], [nothing; LONGEST + 1]);
         whitening.reading(k, D).observe(&innovation, &mut white, &mut correction[..whitening.inner]);
         for white in white {
-            total += white * white;
+            total = total.with_square(white);
         }
-        state.iter_mut().zip(correction).for_each(|(state, by)| *state += by);
-        motion.predict(&mut state, whitening.correlation);
+        state.iter_mut().zip(correction).for_each(|(state, by)| *state = *state + by);
+        motion.predict(state, whitening.correlation);
     }
-    total
+    total.sum()
 }
 
 /// Factors by which a variance is tried in turn, coarse to fine.

@@ -39,9 +39,8 @@ impl Whitening {
             (1, _) => Self::of_size::<1, 2>,
             (2, 0) => Self::of_size::<2, 2>,
             (2, _) => Self::of_size::<2, 3>,
-            (3, 0) => Self::of_size::<3, 3>,
+            // So long chains are rare: one that has no correlated disturbance has one of 0, and the code is there once.
             (3, _) => Self::of_size::<3, 4>,
-            // So long a chain is rare: one that has no correlated disturbance has one of 0, and the code is there once.
             (LONGEST, _) => Self::of_size::<LONGEST, { LONGEST + 1 }>,
             (states, _) => unreachable!("a chain of {states} states"),
         };
@@ -78,7 +77,14 @@ impl Whitening {
             log_determinant: 0.0,
             readings: weights.as_flattened().iter().filter(|&&w| w > 0.0).count(),
         };
+        // What is known of the states settles: from there on each reading is taken in as the one before it.
+        let mut settled = None;
         for weights in weights {
+            if settled == Some(weights) {
+                whitening.repeat(weights);
+                continue;
+            }
+            let before = covariance;
             whitening.update::<D, I>(&mut covariance, &noise.sensors, weights);
             covariance = congruent(&covariance, &transition);
             for i in 0..D {
@@ -89,8 +95,28 @@ impl Whitening {
             for (i, row) in covariance.iter_mut().enumerate().skip(D) {
                 row[i] += noise.gust * (1.0 - correlation * correlation);
             }
+            settled = (covariance == before).then_some(weights);
         }
         whitening
+    }
+
+    /// Takes in a reading with the gain and the whitening matrix of the one before.
+    #[inline(never)]
+    fn repeat(&mut self, weights: &[f64]) {
+        let states = weights.len();
+        self.gains.extend_from_within(self.gains.len() - self.inner * states..);
+        self.roots.extend_from_within(self.roots.len() - states * states..);
+        self.count(weights);
+    }
+
+    /// Adds what a reading has to the determinant: that of its whitening matrix, the last one, where its entries count.
+    #[inline(never)]
+    fn count(&mut self, weights: &[f64]) {
+        let states = weights.len();
+        let root = &self.roots[self.roots.len() - states * states..];
+        for (i, _) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            self.log_determinant -= 2.0 * libm::log(root[i * states + i]);
+        }
     }
 
     /// Takes in a reading: keeps its gain and its whitening matrix, and leaves what is not known yet once it is used.
@@ -126,10 +152,8 @@ impl Whitening {
             // A reading that is ignored adds nothing to the sum of squares.
             let counts = weights[i] > 0.0;
             self.roots.extend(root[i].map(|value| if counts { value } else { 0.0 }));
-            if counts {
-                self.log_determinant -= 2.0 * libm::log(root[i][i]);
-            }
         }
+        self.count(weights);
     }
 
     /// The k-th reading, to be observed.
