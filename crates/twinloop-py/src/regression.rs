@@ -29,6 +29,7 @@ pub struct PyRegression(Regression);
 impl PyRegression {
     #[new]
     fn new(
+        py: Python<'_>,
         #[pyo3(from_py_with = given)] states: usize,
         #[pyo3(from_py_with = given)] dt: f64,
         form: &str,
@@ -36,19 +37,21 @@ impl PyRegression {
     ) -> Result<Self> {
         let chain = Chain { states, dt, form: form.parse()? }.validated()?;
         let features = records.first().map_or(0, |(_, _, start, _, _)| start.as_array().ncols());
-        let record = |(measured, weights, start, middle, end): &RecordArrays<'_>| {
-            let flat = |matrix: &Matrix<'_>, columns| -> Result<Vec<f64>> {
-                let found = row_after_row("record", matrix, columns)?;
-                finite("record", &found)?;
-                Ok(found)
-            };
+        let numbers = |(measured, weights, start, middle, end): &RecordArrays<'_>| {
+            let flat = |matrix: &Matrix<'_>, columns| row_after_row("record", matrix, columns);
             let [start, middle, end] = [start, middle, end].map(|values| flat(values, features));
-            let (start, middle, end) = (start?, middle?, end?);
-            let (measured, weights) = (flat(measured, states)?, flat(weights, states)?);
-            Ok(Record::new(&chain, features, measured, weights, [&start, &middle, &end])?)
+            Ok([flat(measured, states)?, flat(weights, states)?, start?, middle?, end?])
         };
-        let records = records.iter().map(record).collect::<Result<_>>()?;
-        Ok(Self(Regression::new(chain, features, records)?))
+        let records = records.iter().map(numbers).collect::<Result<Vec<_>>>()?;
+        py.detach(|| {
+            let record = |numbers: [Vec<f64>; 5]| {
+                numbers.iter().try_for_each(|each| finite("record", each))?;
+                let [measured, weights, start, middle, end] = numbers;
+                Ok(Record::new(&chain, features, measured, weights, [&start, &middle, &end])?)
+            };
+            let records = records.into_iter().map(record).collect::<Result<_>>()?;
+            Ok(Self(Regression::new(chain, features, records)?))
+        })
     }
 
     /// Readings less what the coefficients explain, a matrix for each record.

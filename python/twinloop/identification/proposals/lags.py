@@ -37,12 +37,9 @@ MOST_DELAY = 50
 RAMPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0)
 """Periods in which an actuator crosses all commands that were sent: limits of its rate that are tried."""
 CLEARLY = 24.0
-"""Units of χ² by which what is tried must be worse for no more of its kind to be tried: a limit of the rate than none,
-a rest of actuators than another."""
+"""Units of χ² by which a limit of the rate must be worse than none for slower ones not to be tried."""
 GRID, RATES = 0, 1000
 """Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
-Rests = list[Floats | None]
-"""Commands whose effect may be there at the start of a run (n_u,), each run's first ones, None, among them."""
 Trial = Callable[[Iterable[Actuation]], list[Hypothesis]]
 """The hypothesis behind each of several other actuators, with sums of the first rung."""
 
@@ -67,10 +64,9 @@ def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 
 def _searched(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
     """The best so far, or a better one with another lag or delay of a group."""
-    rests: Rests = [None, *context.rests]
     for delay in range(context.options.longest_delay + 1):
-        best = _best_lag(context, trial, best, group, delay, rests)
-    return _longer(context, trial, best, group, rests)
+        best = _best_lag(context, trial, best, group, delay)
+    return _longer(context, trial, best, group)
 
 
 def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothesis:
@@ -152,7 +148,7 @@ def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int], of:
 
 
 def _best_lag(
-    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, rests: Rests
+    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int
 ) -> Hypothesis:
     """The best so far, or a better one with this delay.
 
@@ -162,7 +158,7 @@ def _best_lag(
     (found,) = [best] if delay else trial([best.actuation.at_once(group)])
     lag, worse = None if delay else 0.0, 0
     for tried in LAGS if delay else LAGS[1:]:
-        other = _at(context, trial, best, group, delay, [tried], rests)
+        other = _at(context, trial, best, group, delay, [tried])
         if other.evidence > found.evidence:
             found, lag, worse = other, tried, 0
         else:
@@ -173,19 +169,16 @@ def _best_lag(
     several = [best, found]
     if lag:
         # Of the steps of the grid one is larger than a period of delay, which would stand in for a lag between them.
-        beside = [lag * by for by in (1.0 / FINER, FINER)]
-        several.append(_at(context, trial, best, group, delay, beside, rests))
+        several.append(_at(context, trial, best, group, delay, [lag * by for by in (1.0 / FINER, FINER)]))
     return max(several, key=by_evidence)
 
 
-def _longer(
-    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], rests: Rests
-) -> Hypothesis:
+def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
     """The same, or one with a longer delay, for as long as a period more is better with a lag that is no longer."""
     while not (now := best.actuation.actuators[group[0]]).direct and now.delay < MOST_DELAY:
         at_it: Hypothesis | None = None
         for lag in (lag for lag in reversed(LAGS) if lag * context.signals.dt <= now.lag):
-            tried = _at(context, trial, best, group, now.delay + 1, [lag], rests)
+            tried = _at(context, trial, best, group, now.delay + 1, [lag])
             if at_it is not None and max([at_it, tried], key=by_evidence) is at_it:
                 break
             at_it = tried
@@ -206,26 +199,15 @@ def _without(trial: Trial, best: Hypothesis) -> Hypothesis:
 
 
 def _at(
-    context: Context,
-    trial: Trial,
-    best: Hypothesis,
-    group: Sequence[int],
-    delay: int,
-    lags: Sequence[float],
-    rests: Rests,
+    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, lags: Sequence[float]
 ) -> Hypothesis:
-    """The hypothesis behind the best actuators so far, those of a group with this delay: the better lag and rest.
-
-    Rests that are clearly worse go. They differ the more the longer a lag is, so no longer one would suit them better.
-    """
-    asked = list(itertools.product(lags, rests))
+    """The hypothesis behind the best actuators so far, those of a group with this delay: the better lag and rest."""
     several = trial(
-        _with(best.actuation, group, lag, delay, rest, context.signals) for lag, rest in asked
+        _with(best.actuation, group, lag, delay, rest, context.signals)
+        for lag in lags
+        for rest in (None, *context.rests)
     )
-    found = max(several, key=by_evidence)
-    of_rests = [max(several[i :: len(rests)], key=by_evidence) for i in range(len(rests))]
-    rests[:] = itertools.compress(rests, (not found.evidence > one.evidence.less(-CLEARLY) for one in of_rests))
-    return found
+    return max(several, key=by_evidence)
 
 
 def _with(

@@ -23,6 +23,8 @@ HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
 CLOSE = 1e-12
 """Of a command's size: steps that are no longer change nothing that anybody asks for."""
+SETTLED = 1e-6
+"""Share of what is left of a state's motion that a step must take away for another to follow."""
 
 
 def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Linear:
@@ -368,7 +370,7 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
             share *= 0.5
         else:
             return best
-        settled = least - left <= 1e-12 * least
+        settled = least - left <= SETTLED * least
         best, least, found = tried, left, there
         if settled:
             break
