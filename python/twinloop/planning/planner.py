@@ -124,6 +124,7 @@ class Planner(Judge):
         """The score of genes on members under draws of noise, in units of how well known genes do."""
         options, sds = self.options, committee.sds
         limiting = [model for model in committee.delayed if model not in committee.tuned_delayed]
+        of_each = max(1, draws // len(members))
 
         # What is wanted is the best mean in the disturbances that flights meet, not in calm.
         met = self.disturbances(committee, draws)
@@ -136,7 +137,7 @@ class Planner(Judge):
             judged = self.judge_in_turn(members, genes, sds, draws, met)
             lost, usage = judged.lost, judged.finite.worst_usage
             if limiting:
-                delayed = self.judge(limiting, genes, sds, draws)
+                delayed = self.judge(limiting, genes, sds, of_each)
                 lost, usage = lost + delayed.lost, np.maximum(usage, delayed.finite.worst_usage)
             excess = np.maximum(0.0, usage - (1.0 - options.margin))
             return scores_of(lost, judged.mean_of_finite, excess, unit)
