@@ -264,7 +264,12 @@ class Judge:
         return Judged(values, usages)
 
     def judge_in_turn(
-        self, members: Sequence[_core.Model], genes: Floats, sds: Floats, draws: int, disturbances: Floats | None
+        self,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        sds: Floats,
+        draws: int,
+        disturbances: Floats | None,
     ) -> Judged:
         """Flies candidates under each draw on one of the members, in turn: they all count alike, at the price of one.
 

@@ -47,7 +47,7 @@ class PlanningOptions:
             flights have moved them, until a prediction has come true; 0: anywhere.
         ends: whether new gains must keep the envelope also if what states do ends where flights and the task have been;
             after a single flight, as far again.
-        evaluations: number of flights on which gains are tuned at most, for each member and draw.
+        evaluations: number of flights on which gains are tuned at most, for each draw; each draw is met by one member.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
         tuned_in_gusts: whether gains are tuned, and compared with flown ones, in the disturbances that flights met too.
