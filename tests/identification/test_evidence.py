@@ -1,12 +1,14 @@
 """Evidence puts hypotheses in an order, and what they hold beside terms has to pay."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from twinloop.identification import searches
 from twinloop.identification.description import TIE
 from twinloop.identification.evidence import (
     HIDING,
@@ -18,7 +20,7 @@ from twinloop.identification.evidence import (
     by_evidence,
     price,
 )
-from twinloop.identification.searches import Found, decided, lead
+from twinloop.identification.searches import Found, decided, explored, lead
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
 LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))
@@ -79,6 +81,7 @@ class Started:
     start: int
     searches: int = 1
     terms: int = 1
+    fit: None = None
 
 
 def test_a_law_that_has_to_be_ahead_is_believed_only_where_it_is():
@@ -98,6 +101,32 @@ def test_a_law_that_has_to_be_ahead_is_believed_only_where_it_is():
     assert lead(hypothesis(0.0, 0), []) == 0.0
     # One that runs away is worth nothing, however far it is ahead.
     assert decided(Found(hypothesis(-1e6, 0, stable=False)), known, ahead=30.0).best.start == 10
+
+
+@pytest.mark.parametrize(("length", "made"), [(120.0, 2), (80.0, 4)])
+def test_nothing_further_is_proposed_of_readings_whose_first_fit_is_clearly_behind(length, made, monkeypatch):
+    def proposing(one):
+        return lambda context, best: [Started(one, 0)]
+
+    fits = [evidence(length), evidence(length - 1e3), evidence(length - 2e3)]
+    unfitted = replace(evidence(-1e6), fitted=False)
+    monkeypatch.setattr(searches, "PROPOSALS", tuple(proposing(one) for one in (unfitted, *fits)))
+    context, kept = SimpleNamespace(earlier=None, watch=lambda step: None), []
+    start = Started(replace(evidence(0.0), fitted=False), 0)
+
+    def found(other, before=()):
+        kept.clear()
+        (one,) = explored(context, [lambda: start], before, lambda so_far: kept.append(tuple(so_far)), other)
+        return one
+
+    whole = found(None)
+    assert (whole.made, whole.first) == (4, length) and whole.best.evidence == fits[-1]
+    # What is compared is the first fit of each, whatever has been found since.
+    other = Found(Started(evidence(-1e9), 0), first=15.0)
+    assert found(replace(other, first=None)).made == 4 and found(other).made == made
+    # Where it was cut, it ends in the same place.
+    for before in kept[:]:
+        assert found(other, before).made == made
 
 
 @pytest.mark.parametrize(

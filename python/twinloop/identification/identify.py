@@ -139,7 +139,8 @@ def identify_runs(
 
         # What was known before is no law of readings of other ages: from these nothing but a search anew begins.
         every = starts(reading, under_way.form)[: 1 if several else None]
-        several.append(Reading(reading, explored(reading, every, own, kept)))
+        as_known = several[0].searches[0] if several else None
+        several.append(Reading(reading, explored(reading, every, own, kept, as_known)))
     best = likelier(several)
     context, found = best.context, best.found
     context.watch("committee")

@@ -24,7 +24,7 @@ from twinloop.identification.proposals.storage import storage
 from twinloop.identification.proposals.terms import terms
 from twinloop.identification.proposals.undisturbed import undisturbed
 from twinloop.law.reports import late_in
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
@@ -32,6 +32,9 @@ PROPOSALS: tuple[Proposal, ...] = (
     lags, hidden, terms, undisturbed, apart, storage, friction, contacts, gaps, second_look, parts, bare, at_once,
 )  # fmt: skip
 """In the order in which they are made."""
+BEHIND = 100.0
+"""Units of χ² by which readings of other ages, once they are fitted, may be described at more length than those of the
+ages that were known: a sensor that is late shows by then, and what is found afterwards is found of both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +45,24 @@ class Found(Recorded, kind="found"):
         best: what is believed.
         rivals: what else was proposed on the way and lasts on the runs, in order; from other starts, too.
         made: how many proposals were made.
+        first: length of the description of the first hypothesis that was fitted, in units of χ²; None before.
     """
 
     best: Hypothesis
     rivals: tuple[Hypothesis, ...] = ()
     made: int = 0
+    first: float | None = None
+
+    VERSION = 2
+
+    def behind(self, other: Found) -> bool:
+        """Whether what was fitted first is clearly a longer description than what another search fitted first."""
+        return self.first is not None and other.first is not None and self.first > other.first + BEHIND
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of the first version, which did not know what was fitted first."""
+        return {"first": None, **super().renewed(record)}
 
 
 Searches = tuple[Found, ...]
@@ -107,6 +123,7 @@ def explored(
     every: Sequence[Callable[[], Hypothesis]],
     before: Sequence[Found],
     kept: Callable[[Sequence[Found]], None],
+    other: Found | None = None,
 ) -> Searches:
     """What is found from each start, one proposal after another.
 
@@ -115,6 +132,8 @@ def explored(
         every: starts.
         before: of these searches, those that were made before; it may go on with others.
         kept: called with all of these after each start and each proposal.
+        other: what was found of the same readings of other ages; from a search that is behind it nothing further is
+            proposed.
     """
     searches = list(before[: len(every)])
     for number, start in enumerate(every):
@@ -123,6 +142,8 @@ def explored(
             searches.append(Found(start()))
             kept(searches)
         for propose in PROPOSALS[searches[number].made :] if goes_on(context, searches, number) else ():
+            if other is not None and searches[number].behind(other):
+                break
             searches[number] = decided(searches[number], propose(context, searches[number].best))
             kept(searches)
     return tuple(searches)
@@ -166,5 +187,7 @@ def decided(found: Found, proposed: Iterable[Hypothesis], ahead: float = 0.0) ->
     others = (other for other in several[1:] if other is not best and other.evidence.stable)
     # What is drawn from here on is nothing that one of those that are not believed has drawn.
     drawn = max(other.searches for other in several if other.start == best.start)
-    rivals = (*found.rivals, *others)
-    return replace(found, best=replace(best, searches=drawn), rivals=rivals, made=found.made + 1)
+    rivals, first = (*found.rivals, *others), found.first
+    if first is None and best.evidence.fitted and best.evidence.stable:
+        first = best.evidence.length
+    return replace(found, best=replace(best, searches=drawn), rivals=rivals, made=found.made + 1, first=first)
