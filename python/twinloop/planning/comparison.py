@@ -15,6 +15,7 @@ from twinloop.flights import disagreements
 from twinloop.planning.beyond import bears_ending
 from twinloop.planning.candidates import Candidates
 from twinloop.planning.failed import stand_for_failed
+from twinloop.planning.halfway import beyond_halfway
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.reach import reach_of
@@ -72,7 +73,7 @@ class Comparison:
         )
         self.possible = self._possible()
         within = self.possible & (self.quiet.worst_usage <= reach)
-        self.keeps = within & self._bears_delay() & self._near_what_was_seen()
+        self.keeps = within & self._bears_delay() & self._near_what_was_seen() & self._halfway()
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -175,6 +176,12 @@ class Comparison:
         near[drafts.repeats :] |= self.flown.flies
         return near if near[: drafts.repeats].any() else np.ones_like(near)
 
+    def _halfway(self) -> Flags:
+        """Candidates that lead no more than half as far from the best gains flown as flights that have disappointed."""
+        flown = self.flown
+        beyond = beyond_halfway(self.judge.family, self.drafts.genes, flown.best, flown.disproved)
+        return np.asarray(beyond == 0.0)
+
     def _most(self) -> float:
         """Predicted quality that any flight may have at most; one for the model may cost as much again."""
         # Where no flight has kept the envelope, one that does may be worse than what is promised.
@@ -272,6 +279,7 @@ class Comparison:
             members=(high, low),
             lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
             untunable=tuple(self.judge.family.names[i] for i in self.committee.untunable),
+            halfway=bool(self.flown.disproved),
         )
 
 

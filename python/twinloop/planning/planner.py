@@ -275,7 +275,7 @@ class Planner(Judge):
         starts = [flown.best, far.drafts.genes[int(np.argmin(promising))]]
         genes = tune_within(
             self, self.options, committee, far.members, bounds, starts, wanted.number,
-            lambda: self.watch("candidates"),
+            lambda: self.watch("candidates"), flown.disproved,
         )  # fmt: skip
         found = self._compared(committee, genes, flown, replace(wanted, exploit=False, plain=wanted.exploit))
         return found if found.keeps[0] else far

@@ -47,6 +47,7 @@ class Flown:
         borne: how many of the last flights whose excitation was held back kept the envelope.
         seen: where the flights have been, as long as no prediction has come true.
         begins: usage of the envelope where the task begins: flights of the task cannot have less.
+        disproved: genes of flights that were clearly worse than the best one, and that the committee takes for as good.
     """
 
     best: Floats
@@ -59,6 +60,7 @@ class Flown:
     borne: int = 1
     seen: Seen | None = None
     begins: float = 0.0
+    disproved: Sequence[Floats] = ()
 
 
 @dataclass(frozen=True)

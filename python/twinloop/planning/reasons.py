@@ -33,6 +33,7 @@ class Why:
         members: numbers of the two.
         lawless: names of states of which no law is known.
         untunable: names of the gains that cannot be tuned for that.
+        halfway: whether its gains stay halfway to those of flights that the twin is wrong about.
     """
 
     trusted: bool
@@ -52,6 +53,7 @@ class Why:
     members: tuple[int, int]
     lawless: tuple[str, ...] = ()
     untunable: tuple[str, ...] = ()
+    halfway: bool = False
 
 
 def reason(why: Why, signals: Signals) -> str:
@@ -64,6 +66,11 @@ def reason(why: Why, signals: Signals) -> str:
     sentences = [_what_flies(why), _what_it_tells(why, signals)]
     if why.trusted and why.gains_count and why.lawless:
         sentences.append(what_stays(why.lawless, () if why.repeats else why.untunable))
+    if why.halfway and not why.repeats:
+        sentences.append(
+            "Its gains go at most halfway from the best ones flown to those of a flight that came out clearly worse"
+            " than the twin makes it, even now."
+        )
     if not why.safe:
         sentences.append(
             "No candidate completes the flight within the envelope and its margin on every"

@@ -13,6 +13,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.planning.gains import scores_of, tune_gains
+from twinloop.planning.halfway import beyond_halfway
 from twinloop.planning.judging import Committee, Judge
 from twinloop.planning.settings import PlanningOptions
 
@@ -29,6 +30,7 @@ def tune_within(
     starts: Sequence[Floats],
     number: int,
     watch: Callable[[], None],
+    disproved: Sequence[Floats] = (),
 ) -> Floats:
     """Genes (size,) of the best mean quality of those whose quiet flights stay within bounds, with the margin.
 
@@ -41,6 +43,7 @@ def tune_within(
         starts: genes to start from, the best flown first: gains that cannot be tuned stay as there.
         number: of the test, for its streams.
         watch: called after every generation.
+        disproved: gains of flights that the committee is wrong about: the answer leads at most halfway to them.
 
     Returns:
         Those of the least excess where none stays within.
@@ -52,6 +55,7 @@ def tune_within(
         genes = committee.as_flown(asked, starts[0])
         near = judge.judge_within(bounds, members, genes)
         lost, excess = near.lost, np.maximum(0.0, near.finite.worst_usage - most)
+        excess = excess + beyond_halfway(judge.family, genes, starts[0], disproved)
         if committee.delayed:
             late = judge.judge(committee.delayed, genes, nothing, 1)
             lost = lost + late.lost

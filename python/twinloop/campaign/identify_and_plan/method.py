@@ -21,6 +21,7 @@ from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice
+from twinloop.campaign.identify_and_plan.disproved import disproved
 from twinloop.campaign.identify_and_plan.inside import inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
@@ -176,7 +177,7 @@ class IdentifyAndPlan:
         tuned = self._gains(book)
         waits = self._last_of(book, tuned) is not None
         final = last and self.options.exploit_last and not waits
-        flown = self._flown(book, best, tuned)
+        flown = self._flown(book, best, tuned, committee)
         # Of what has no law nothing would be learnt without an excitation.
         exploits = self.setup.goal == "control" and not self.planner.excites(committee)
         found = self.planner.propose(
@@ -265,7 +266,7 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, asked=self._latest(), under_way=None)
         return test
 
-    def _flown(self, book: Logbook, best: Test | None, tuned: Floats) -> Flown:
+    def _flown(self, book: Logbook, best: Test | None, tuned: Floats, committee: Committee) -> Flown:
         """What the planner has to know of the flights so far."""
         known = best is not None and standing.flies(book, best.number)
         good = None
@@ -284,6 +285,7 @@ class IdentifyAndPlan:
             borne=standing.borne(book),
             seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
             begins=float(usages_of(self.setup.signals, self.setup.initial_state[np.newaxis]).max()),
+            disproved=() if good is None else disproved(self.planner, committee, book, good),
         )
 
     def _seen(self, book: Logbook) -> Seen:
@@ -324,7 +326,7 @@ class IdentifyAndPlan:
         if not committee.predicts_limits:
             return tuned
         best = standing.best_flown(book)
-        flown = self._flown(book, best, tuned)
+        flown = self._flown(book, best, tuned, committee)
         if flown.seen is None and self.planner.is_near(committee, tuned, flown):
             return tuned
         goal, number = self.setup.goal, len(book.tests)

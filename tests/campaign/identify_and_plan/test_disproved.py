@@ -1,0 +1,65 @@
+"""Disproved: flights that the committee promised, that came out worse, and that it still does not explain."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from committees import TUNED, committee_of, planner_of, signals
+from twinloop.campaign import standing
+from twinloop.campaign.identify_and_plan.disproved import disproved
+from twinloop.planning.gusts import Moved
+
+
+def found_of(monkeypatch, qualities, good, predicted=None, on_task=True, committee=None):
+    """Numbers of the tests that are found disproved, all of the same gains."""
+    known = signals()
+    planner = planner_of(known, draws=8)
+    genes = [TUNED * (1.0 + 1e-9 * number) for number in range(len(qualities))]
+    told = predicted or [1.0] * len(qualities)
+    tests = [
+        replace(planner.test(of, *ends_of(planner)), number=number, predicted=told[number])
+        for number, of in enumerate(genes)
+    ]
+    book = SimpleNamespace(flown=dict.fromkeys(range(len(tests))), tests=tests)
+    monkeypatch.setattr(standing, "measured", lambda book, number: qualities[number])
+    monkeypatch.setattr(standing, "on_task", lambda book, test: on_task)
+    found = disproved(planner, committee or committee_of(known), book, good)
+    return [
+        number for number, of in enumerate(genes) if any(of.tobytes() == other.tobytes() for other in found)
+    ]
+
+
+def ends_of(planner):
+    return planner.task.initial_state, planner.task.target_state
+
+
+@pytest.fixture(name="expected")
+def _expected():
+    known = signals()
+    planner, committee = planner_of(known, draws=8), committee_of(known)
+    judged = planner.judge(committee.members, TUNED[None], committee.sds, 8, measured=True).qualities
+    return float(judged.mean()), float(judged.std())
+
+
+def test_a_flight_that_was_clearly_worse_than_the_best_and_than_the_twin_makes_it_is_one(
+    expected, monkeypatch
+):
+    mean, sd = expected
+    worse = [mean + 5.0 * sd, 2.0 * mean, None, 1.01 * mean]
+    assert 5.0 * sd > 0.1 * mean
+    assert found_of(monkeypatch, worse, good=mean) == [0, 1]
+    # Nor is one that nobody had promised, nor one of another task, nor one in which the twin sees nothing good.
+    assert found_of(monkeypatch, worse, good=mean, predicted=[None, 1.0, 1.0, 1.0]) == [1]
+    assert found_of(monkeypatch, worse, good=mean, on_task=False) == []
+    assert found_of(monkeypatch, worse, good=0.5 * mean) == []
+    assert found_of(monkeypatch, worse, good=float("inf")) == []
+
+
+def test_what_noise_and_known_disturbances_explain_disproves_nothing(expected, monkeypatch):
+    mean, sd = expected
+    within = [mean + 1.5 * sd]
+    assert found_of(monkeypatch, within, good=0.98 * mean) == []
+    gusty = replace(committee_of(signals()), gusts=SimpleNamespace(on=lambda test: Moved(0.0, mean)))
+    assert found_of(monkeypatch, [2.0 * mean], good=mean, committee=gusty) == []
+    assert found_of(monkeypatch, [4.0 * mean], good=mean, committee=gusty) == [0]
