@@ -218,6 +218,23 @@ def test_the_likelihood_is_that_of_one_big_normal_distribution(states, form, mot
         )
 
 
+@pytest.mark.parametrize(("states", "form"), CASES)
+@pytest.mark.parametrize("motion", [(2.0, 0.0, 1.0), (0.5, 20.0, 0.2)], ids=["white", "gusts"])
+def test_many_records_are_as_likely_together_as_one_after_the_other(states, form, motion):
+    dense = Dense(states, form)
+    # Records that share a filter and are looked at together, one between them that does not, and shorter ones; so much
+    # moves them that what is known of a state settles, and once more after each reading that is ignored.
+    records, truth = drawn(dense, 4, steps=120, runs=6)
+    records += drawn(dense, 5, steps=120, runs=1, ignored=4)[0] + drawn(dense, 6, steps=90, runs=3)[0]
+    sensors = np.array([1e-3, 4e-3, 2e-3])[:states]
+    expected = 0.0
+    for z, f, covariance in dense_problem(dense, records, sensors, motion):
+        density = multivariate_normal(cov=covariance, allow_singular=False).logpdf(z - f @ truth)
+        expected += -2.0 * density - len(z) * np.log(2.0 * np.pi)
+    regression = _core.Regression(states, DT, form, records)
+    assert regression.likelihood(truth, sensors, motion) == pytest.approx(expected, rel=1e-6)
+
+
 def wandering(dense, sensors, motion, steps, seed):
     """A record without features, drawn from the noise alone."""
     white, gust, memory = motion
