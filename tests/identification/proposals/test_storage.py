@@ -222,7 +222,7 @@ def test_what_is_tried_beside_others_is_what_is_tried_alone():
     turning = HiddenState((), False, 0.0, 1.0, (0,), False, 0.1)
     several += [(), (turning, turning), (HiddenState((0,), False, 0.0, 0.2), *several[2])] * 8
     assert len(several) > AT_ONCE
-    at_once, screen = Screen.of(context, start)(several), Screen.of(context, start)
+    at_once, screen = Screen.of(context, start, 0)(several), Screen.of(context, start, 0)
     alone = [one for sources in several for one in screen([sources])]
     assert len({found.evidence.length for found in at_once}) > 3
     for one, other, sources in zip(at_once, alone, several, strict=True):

@@ -47,6 +47,8 @@ QUIET = 0.3
 """Variance of what disturbs in a period, in a sensor's, up to which it is not."""
 MORE = 6
 """Terms at most that are added one by one."""
+SCREENS = 100
+"""Number of the first screen; those of storages have smaller ones."""
 FINALISTS = 3
 """Terms, those that promise most, that are tuned before one is taken."""
 
@@ -64,9 +66,10 @@ def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("hidden")
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
     # A lag may have stood in for what a mass does, so commands that act at once come first.
+    numbers = itertools.count(SCREENS)
     for variant in (*at_once(context, bare), bare):
-        screen, short = Screen.of(context, variant), _short(variant)
-        looked = screen if short is variant else Screen.of(context, short)
+        screen, short = Screen.of(context, variant, next(numbers)), _short(variant)
+        looked = screen if short is variant else Screen.of(context, short, next(numbers))
         for place in rates:
             several: list[Hypothesis] = []
             for pairs in _nearest(_masses(looked, place)):

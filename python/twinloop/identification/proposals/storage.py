@@ -8,9 +8,11 @@ shows by linear terms; what it moves is chosen among all terms, as for a hidden 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,8 +55,10 @@ FEW = 2
 """Kinds of storage that are followed up where they are looked for as if nothing disturbed."""
 AT_ONCE = 24
 """Hidden states of which inner products are computed at once."""
-STORED = 50
-"""Number of the unit of work that looks for them."""
+SEARCHES = 2
+"""Of all terms, that each kind of storage is searched by: with the noise from below, and from above."""
+STORED, FURTHER = 50, 10_000
+"""Number of the unit of work that looks for them, and how far those of further screens are from it."""
 
 Sources = tuple[HiddenState, ...]
 """Hidden states of one time, those that commands fill first."""
@@ -72,32 +76,50 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("hidden")
     # Behind a short memory of noisy readings their noise would explain itself.
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
-    better = False
-    for told in _told(context, bare):
+    better, numbers = False, _Numbers(itertools.count(), itertools.count(bare.searches, SEARCHES))
+    for told in _told(context, bare, numbers):
         better |= told.evidence > hypothesis.evidence
         yield told
     if not better:
         for variant in _undisturbed(context, bare):
-            yield from _told(context, variant, brief=True)
+            yield from _told(context, variant, numbers, brief=True)
 
 
-def _told(context: Context, bare: Hypothesis, brief: bool = False) -> Iterator[Hypothesis]:
+class _Numbers(NamedTuple):
+    """Numbers by which what is drawn is told apart.
+
+    Args:
+        screens: of the screens.
+        searches: of the searches of all terms, as a hypothesis counts them.
+    """
+
+    screens: Iterator[int]
+    searches: Iterator[int]
+
+
+def _told(context: Context, bare: Hypothesis, numbers: _Numbers, brief: bool = False) -> Iterator[Hypothesis]:
     """A hypothesis with the best hidden states that motion fills, beside its lags and in their place, fitted.
 
     Args:
         context: of the identification.
         bare: without such states.
+        numbers: the next ones.
         brief: as for `filled_by_motion`.
     """
-    screens = [Screen.of(context, variant) for variant in (bare, *at_once(context, bare))]
+    screens = [
+        Screen.of(context, variant, next(numbers.screens)) for variant in (bare, *at_once(context, bare))
+    ]
     for screen in screens:
         for found in filled_by_motion(screen, brief):
             # What is stored in place of a lag describes more than the lag alone, or all that is fitted is in vain.
             if screen is not screens[0] and not found.evidence > screens[0].plain.evidence:
                 continue
+            found = replace(found, searches=next(numbers.searches))
             told = fitted(context, from_both_sides(context, found, found.sums))
-            if shows(told.actuation.hidden, context.signals.dt):
-                yield told
+            # What readings cannot show is no law, but has drawn what nothing else may.
+            if told.fit is not None and not shows(told.actuation.hidden, context.signals.dt):
+                told = replace(told, fit=replace(told.fit, chi_squared=math.inf))
+            yield told
 
 
 def shows(hidden: Sequence[HiddenState], period: float) -> bool:
@@ -218,8 +240,14 @@ class Screen:
     numbers: Iterator[int]
 
     @staticmethod
-    def of(context: Context, hypothesis: Hypothesis) -> Screen:
-        """What begins with the sums of a hypothesis, without terms of a hidden state that commands fill."""
+    def of(context: Context, hypothesis: Hypothesis, number: int) -> Screen:
+        """What begins with the sums of a hypothesis, without terms of a hidden state that commands fill.
+
+        Args:
+            context: of the identification.
+            hypothesis: with these sums.
+            number: of the screen, by which what it draws is told from what others of the same start draw.
+        """
         candidates = hypothesis.candidates.growing()
         pool = candidates.pool
         filled(pool, 2)
@@ -237,7 +265,7 @@ class Screen:
         usable = problem.usable(terms)
         for found in bare.sums:
             problem.feedthrough(found.chain, usable)
-        unit = context.unit.part(hypothesis.start + STORED)
+        unit = context.unit.part(hypothesis.start + STORED + FURTHER * number)
         return Screen(context, bare, terms, inputs, problem, unit, itertools.count(1))
 
     def beside(self) -> Screen:
