@@ -86,7 +86,7 @@ def test_a_controller_that_is_refused_is_not_one_to_fly_in_a_terminal(hasty):
 
 
 def test_the_strongest_reason_is_a_serious_remark_for_it_says_what_to_do():
-    campaign = lives.learnt(lives.with_end_stop, 3)
+    campaign = lives.learnt(lives.with_end_stop, 2)
     reasons = summary(campaign, {"name": "p"}, {})["verdict"]["twin"]["reasons"]
     grave = [remark.sentence for remark in campaign.twin.remarks if remark.serious]
     failed = [each.sentence for each in campaign.checks().failed if each.subject == "twin"]

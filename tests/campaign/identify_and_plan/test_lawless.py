@@ -235,7 +235,7 @@ def test_without_an_excitation_a_flight_that_is_flown_again_varies_the_others_al
     best = campaign.experiments[0].test
     committee = method._committee(book)
     drafts = candidates(
-        method.planner, campaign.options, best.genes, method._flown(book, best, best.genes), "both", 1, True,
+        method.planner, campaign.options, best.genes, method._flown(book, best, best.genes, committee), "both", 1, True,
         committee.lawless, committee.untunable,
     )  # fmt: skip
     again = drafts.genes[drafts.repeats :]
