@@ -48,3 +48,6 @@ def test_a_proposal_stays_halfway_and_says_so(exploit):
     # It still goes on, and the twin is still asked how far.
     assert kept.predicted < 0.95 * good
     assert "halfway" in kept.reason and "halfway" not in free.reason
+    # The best gains themselves were worse once: that leads nowhere, and holds nothing back.
+    again = proposed(BEST)
+    assert again.reason == free.reason and again.genes.tobytes() == free.genes.tobytes()

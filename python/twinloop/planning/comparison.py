@@ -73,7 +73,7 @@ class Comparison:
         )
         self.possible = self._possible()
         within = self.possible & (self.quiet.worst_usage <= reach)
-        self.keeps = within & self._bears_delay() & self._near_what_was_seen() & self._halfway()
+        self.keeps = within & self._bears_delay() & self._near_what_was_seen() & self._halfway
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -176,6 +176,7 @@ class Comparison:
         near[drafts.repeats :] |= self.flown.flies
         return near if near[: drafts.repeats].any() else np.ones_like(near)
 
+    @cached_property
     def _halfway(self) -> Flags:
         """Candidates that lead no more than half as far from the best gains flown as flights that have disappointed."""
         flown = self.flown
@@ -279,7 +280,7 @@ class Comparison:
             members=(high, low),
             lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
             untunable=tuple(self.judge.family.names[i] for i in self.committee.untunable),
-            halfway=bool(self.flown.disproved),
+            halfway=not self._halfway.all(),
         )
 
 

@@ -33,7 +33,7 @@ class Why:
         members: numbers of the two.
         lawless: names of states of which no law is known.
         untunable: names of the gains that cannot be tuned for that.
-        halfway: whether its gains stay halfway to those of flights that the twin is wrong about.
+        halfway: whether some candidates lead too far towards gains of flights that the twin is wrong about.
     """
 
     trusted: bool
@@ -68,8 +68,8 @@ def reason(why: Why, signals: Signals) -> str:
         sentences.append(what_stays(why.lawless, () if why.repeats else why.untunable))
     if why.halfway and not why.repeats:
         sentences.append(
-            "Its gains go at most halfway from the best ones flown to those of a flight that came out clearly worse"
-            " than the twin makes it, even now."
+            "An earlier flight was clearly worse than the twin predicts it even now: these gains go at most halfway"
+            " from the best ones flown to those of that flight."
         )
     if not why.safe:
         sentences.append(

@@ -91,9 +91,10 @@ impl Numbers for Several {
     }
 }
 
-/// Sum of the squares of the whitened residuals of records that share a filter.
+/// [`squares`] of some size.
 type Squares = fn(&Chain, &Whitening, &[Vec<f64>]) -> f64;
 
+/// Sum of the squares of the whitened residuals of records that share a filter, as many as fit into the numbers at most.
 fn squares<const D: usize, T: Numbers>(chain: &Chain, whitening: &Whitening, residuals: &[Vec<f64>]) -> f64 {
     let motion = Motion { states: D, ..chain.motion() };
     let nothing = T::of(|_| 0.0, residuals.len());
