@@ -80,6 +80,7 @@ ABLATIONS: dict[str, Ablation] = {
     "implicit": Ablation(
         "quotients with a denominator of their own, joints that share masses", {"implicit": False}
     ),
+    "exponentials": Ablation("terms that grow by a factor", {"exponentials": False}),
     "contacts": Ablation("stops, backlash and other terms that begin at a place", {"contacts": False}),
     "friction": Ablation("dry friction", {"friction": False}),
     "lags": Ablation("lags and delays", {"lags": False}),
@@ -177,6 +178,7 @@ SMOKE_OPTIONS: dict[str, Mapping[str, object]] = {
         "moves": 500,
         "starts": 1,
         "contacts": False,
+        "exponentials": False,
         "friction": False,
         "lags": False,
         "hidden": False,

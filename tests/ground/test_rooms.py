@@ -42,15 +42,15 @@ FRONTS = {
     "identification": "identified identify outliers records remarks settings",
     "identification/fit": "alternation committee fitting models predictions promises settling tuning",
     "identification/proposals": (
-        "apart at_once bare contacts friction gaps hidden lags parts second_look storage terms undisturbed"
+        "apart at_once bare contacts exponentials friction gaps hidden lags parts second_look storage terms undisturbed"
     ),
     "identification/search": (
         "behind_a_law directions drives hidden masses moderation noise problem selection structure walks"
     ),
     "identification/sensors": "chains euler_steps noise offsets reported",
     "identification/terms": (
-        "attitude bounds candidates denominators directions formulas friction hinges joints libraries pool "
-        "priors sizes"
+        "attitude bounds candidates denominators directions exponentials formulas friction hinges joints libraries "
+        "pool priors sizes"
     ),
     "law": (
         "accuracy actuation beginning ending equations expressions flight flown forms law levels noise parsing pieces "

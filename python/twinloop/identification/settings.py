@@ -61,6 +61,7 @@ class IdentificationOptions:
             masses.
         contacts: whether terms that begin at a place are searched, such as the force of a stop or of a gear with
             backlash, or the limit of how fast a servo turns.
+        exponentials: whether terms that grow by a factor are searched, such as a reaction with its temperature.
         friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
         ramps: whether actuators may move at a limited rate.
@@ -125,6 +126,7 @@ class IdentificationOptions:
     undisturbed: bool = True
     implicit: bool = True
     contacts: bool = True
+    exponentials: bool = True
     friction: bool = True
     lags: bool = True
     ramps: bool = True
@@ -172,6 +174,7 @@ class IdentificationOptions:
             generations=0,
             implicit=False,
             contacts=False,
+            exponentials=False,
             friction=False,
             hidden=False,
             storage=False,

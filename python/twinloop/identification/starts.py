@@ -26,10 +26,10 @@ from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation, alike_commands
 from twinloop.law.forms import EULER
 
-ANEW, PARTS, RENEWED, FORMS, CONTACTS = 0, 1, 10, 100, 300
+ANEW, PARTS, RENEWED, FORMS, CONTACTS, GROWTH = 0, 1, 10, 100, 300, 600
 """Numbers of starts; each start draws from streams under its own number. In order: whole runs anew, the first part of
-the only run, what was known, the first form, and what a search for contacts adds to the number of its start. Further
-parts and forms take the numbers that follow."""
+the only run, what was known, the first form, and what searches for contacts and for exponentials add to the number of
+their start. Further parts and forms take the numbers that follow."""
 
 
 def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:

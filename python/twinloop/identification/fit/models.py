@@ -10,6 +10,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.bounds import Limits
+from twinloop.identification.terms.exponentials import origins
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import partners
 from twinloop.law.expressions import SHARE
@@ -54,7 +55,8 @@ def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
 def inner(hypothesis: Hypothesis) -> dict[int, int]:
     """Places of those constants inside nodes that may move, each with its node."""
     pool = hypothesis.pool
-    kept = {pool.one, *pool.needed(_known(hypothesis))}
+    used = [term for found in hypothesis.sums for term in found.weights]
+    kept = {pool.one, *pool.needed(_known(hypothesis)), *origins(pool, used)}
     # The scale of a share says what the same expression times a weight says: to tune both would be one too many.
     return {
         place: node
