@@ -397,7 +397,7 @@ def test_where_the_tuned_gains_may_not_be_flown_the_last_test_is_the_best_of_the
     left = Flown(flown, True, [1.0], 0.5 * quality, fared=Fared(3, 1))
     found = planner.propose(committee, lazy, left, goal, 3, exploit=True, last=True)
     assert found.reason.startswith(
-        "The best gains flown, again, though 1 of their 3 flights left the envelope."
+        "The best gains flown, again, though 1 of their 3 flights did not keep the envelope to the end."
     )
 
 

@@ -23,6 +23,8 @@ PRICE = 12.0
 """What an age must gain in χ²: its number, and the choice of having one."""
 AGING = 500
 """Number of the first trial, by which what it draws is told from what others draw."""
+RECEIVERS = 100_000
+"""How far the numbers of each further receiver's trials are from those of the one before."""
 
 
 def aged(context: Context, logged: Sequence[Run]) -> Reports:
@@ -37,16 +39,17 @@ def aged(context: Context, logged: Sequence[Run]) -> Reports:
     reports, earlier = context.reports, context.earlier
     before = reports_of(earlier.model, context.signals.n_x) if earlier is not None and context.settled else ()
     known = {report.every: report.age for report in before if isinstance(report, Held)}
-    for every in dict.fromkeys(report.every for report in reports if isinstance(report, Held)):
+    receivers = dict.fromkeys(report.every for report in reports if isinstance(report, Held))
+    for number, every in enumerate(receivers):
         if every in known:
             reports = with_age(reports, every, known[every])
         else:
-            reports = _of_one(context, logged, reports, every)
+            reports = _of_one(context, logged, reports, every, AGING + RECEIVERS * number)
     return reports
 
 
-def _of_one(context: Context, logged: Sequence[Run], reports: Reports, every: int) -> Reports:
-    """The same with the age of what gives a reading in so many periods."""
+def _of_one(context: Context, logged: Sequence[Run], reports: Reports, every: int, first: int) -> Reports:
+    """The same with the age of what gives a reading in so many periods; its trials are numbered from the first on."""
     longest, step = int(LONGEST * every), max(1, round(COARSE * every))
     lengths: dict[int, float] = {}
 
@@ -56,7 +59,7 @@ def _of_one(context: Context, logged: Sequence[Run], reports: Reports, every: in
             # The same readings count at any age.
             runs = [as_sensed(run, tried, context.signals, ignored=longest) for run in logged]
             price = PRICE if age else 0.0
-            lengths[age] = price + briefly_described(context, runs, AGING + age)
+            lengths[age] = price + briefly_described(context, runs, first + age)
         return lengths[age]
 
     best = 0

@@ -14,6 +14,9 @@ from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
 
+MOST_DOUBLINGS = 64
+"""Flights after which an excitation that is doubled with each has long been at its most."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -104,7 +107,7 @@ def candidates(
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:
         # Gains that have flown bear more of it than before, and once more the same would tell little.
-        stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
+        stronger = min(2.0 ** min(max(1, flown.times), MOST_DOUBLINGS) * options.excitation, most)
         along = directions_of(judge, flown.best) if options.hold_back and not leads else None
         target = judge.task.first_target
         beside = directions_for(judge.family, flown.best, target, lawless) if leads and lawless else None

@@ -280,7 +280,7 @@ class Comparison:
             members=(high, low),
             lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
             untunable=tuple(self.judge.family.names[i] for i in self.committee.untunable),
-            halfway=not self._halfway.all(),
+            halfway=bool(self._halfway[chosen]) and not self._halfway.all(),
         )
 
 

@@ -29,6 +29,8 @@ ENTERING = 0.1
 """Share of such a flight, at its beginning, over which its excitation grows from nothing."""
 GROWTH = 8.0
 """Ratio of its excitation at the end, before it fades, to that at the beginning."""
+MOST_GROWTHS = 64
+"""Flights after which an excitation has long been at its most."""
 NEARBY = 1.0 / 1024.0
 """Share of the envelope by which a state is off where the answer of a controller is asked for: a power of two."""
 USUAL = 0.625
@@ -72,7 +74,8 @@ def growing_chirps(
     first = np.minimum(amplitude, SHARE * answers)
     first = np.where(answers > 0.0, first, first.min(where=answers > 0.0, initial=amplitude))
     # The task itself moves the states most at its beginning: what is borne at its end may be too much there.
-    growths = sqrt(GROWTH**flights), GROWTH ** (flights + 1)
+    steps_up = min(flights, MOST_GROWTHS)
+    growths = sqrt(GROWTH**steps_up), GROWTH ** (steps_up + 1)
     begin, end = (np.maximum(first, np.minimum(first * growth, most)) for growth in growths)
     passed = np.arange(steps)[:, np.newaxis] / steps
     entering = np.minimum(1.0, passed / ENTERING)

@@ -160,12 +160,6 @@ class Judged:
         return Judged(np.where(lasts, self.qualities, 0.0), np.where(lasts, self.usages, 0.0))
 
     @property
-    def scatter(self) -> float:
-        """Standard deviation of the flights that do not diverge; 0 where none is left."""
-        left = self.qualities[np.isfinite(self.qualities)]
-        return float(left.std()) if left.size else 0.0
-
-    @property
     def worst_usage(self) -> Floats:
         """Over members and draws (K,)."""
         worst: Floats = self.usages.max(axis=(0, 1))

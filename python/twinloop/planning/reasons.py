@@ -73,8 +73,9 @@ def reason(why: Why, signals: Signals) -> str:
         )
     if not why.safe:
         sentences.append(
-            "No candidate completes the flight within the envelope and its margin on every"
-            " model under sensor noise: this is the safest known. Fly it with a hand on the switch, or not at all."
+            "On some model this flight leaves the envelope or its margin under sensor noise, and none that stays inside"
+            " on all of them may be flown now: this is the safest known. Fly it with a hand on the switch, or not at"
+            " all."
         )
     return " ".join(sentence for sentence in sentences if sentence)
 
@@ -83,7 +84,7 @@ def _what_flies(why: Why) -> str:
     """That the best gains flown fly again; nothing where others do."""
     known = ": they are known to fly" * why.flies
     if why.fared.left:
-        known = f", though {why.fared} left the envelope"
+        known = f", though {why.fared} did not keep the envelope to the end"
     if not why.repeats:
         return ""
     if why.excited:

@@ -176,6 +176,22 @@ def test_without_a_command_the_state_is_held():
     assert (far <= [2.0, 5.0]).all() and (far >= [-2.0, 0.0]).all()
 
 
+@pytest.mark.parametrize("start", [(-2.0, 0.0), (2.0, 0.0), (-2.0, 5.0), (0.5, 2.0)])
+@pytest.mark.parametrize("pull", [0.6, -0.4, 3.0])
+def test_what_holds_a_state_is_found_beside_commands_at_their_bounds(start, pull):
+    """Two commands that do nearly the same, with SciPy's bounded least squares as the oracle."""
+    signals = tl.Signals([tl.State("a", "1", 1.0), tl.State("b", "1", 1.0)], SIGNALS.commands, SIGNALS.dt)
+    lines = [f"r4 = r2 - {pull}", "r5 = r3 * 0.98", "r5 = r2 - r5", f"r5 = r5 - {pull}"]
+
+    held = trimmed(Law.of(model_of(lines, signals=signals), signals), np.zeros(2), np.array(start))
+
+    # The law has commands in units of their scales, 2 and 5.
+    effects, bounds = np.array([[0.5, 0.0], [0.5, -0.196]]), ([-2.0, 0.0], [2.0, 5.0])
+    best = scipy.optimize.lsq_linear(effects, [pull, pull], bounds, tol=1e-12).x
+    np.testing.assert_allclose(effects @ held, effects @ best, atol=1e-5)
+    assert (held >= bounds[0]).all() and (held <= bounds[1]).all()
+
+
 def test_what_has_no_derivative_is_refused():
     with pytest.raises(NotAvailable, match="discrete=True"):
         twin(["r4 = r0 * 0.9"], "absolute").linearise([0.0, 0.0], [0.0, 0.0])

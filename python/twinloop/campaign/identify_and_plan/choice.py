@@ -70,7 +70,9 @@ class Choice:
         """
         flown = best if best is not None and standing.finishes(self.book, best.number) else None
         genes = np.stack([tuned] if flown is None else [tuned, flown.genes])
-        members = self.planner.stable_members(self.committee.members, genes)
+        # One that diverges under gains that have flown is wrong; under others it may be right.
+        everyone = self.committee.members
+        members = everyone if flown is None else self.planner.stable_members(everyone, genes[1:])
         judged = self._judge(members, genes)
         recorded = self._judge(members, genes, measured=True).qualities
         refused = self._refused(members, judged, tuned, flown)
@@ -97,15 +99,15 @@ class Choice:
             reason = f"Tuned on the twin: better than the best flown gains {found}."
             if not flies:
                 reason = (
-                    "Tuned on the twin: no model predicts that they leave the envelope, as the best flown gains"
-                    " did."
+                    "Tuned on the twin: no model predicts that they leave the envelope, and the best flown gains did"
+                    " not keep it to the end."
                 )
             return self._tuned(tuned, judged, recorded, f"{reason}{self._stays}")
         reason = f"The best gains flown: {refused}."
         if not flies:
-            reason += " They left the envelope when they flew."
+            reason += " They did not keep the envelope to the end when they flew."
         elif own.left:
-            reason += f" But {own} left the envelope."
+            reason += f" But {own} did not keep the envelope to the end."
         reason += self._measured_better(flown)
         return self._flown(flown, judged, recorded, reason)
 
@@ -129,6 +131,8 @@ class Choice:
         better = standing.best_flown(self.book)
         if better is None or better.number == flown.number:
             return ""
+        if better.excitation is None and flown.excitation is None:
+            return f" Test {better.number} was measured better; what the twin predicts speaks for these."
         return f" Test {better.number} was measured better; without excitation these are better."
 
     @property
@@ -153,12 +157,15 @@ class Choice:
             return (
                 "a flight with gains close to those that the twin prefers, or alike on it, failed or was cut"
             )
-        if flown is not None and self.misses and self._tuned_have_flown():
+        others = flown is None or tuned.tobytes() != flown.genes.tobytes()
+        if others and flown is not None and self.misses and self._tuned_have_flown():
             return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
         if self.committee.lawless and (flown is None or not self.committee.gains_count):
             return f"the twin knows no law of {enumerated(self._lawless)} yet"
         if not self.committee.gains_count:
             return "the gains have no effect on the twin, which does not know yet what the commands do to the task"
+        if not others:
+            return "the twin finds no better ones that may be flown now"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
@@ -182,8 +189,6 @@ class Choice:
 
     def _not_preferred(self, recorded: Floats, tuned: Floats, flown: Test, better: float) -> str:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
-        if tuned.tobytes() == flown.genes.tobytes():
-            return "the twin finds no better ones that may be flown now"
         alone = self._measured_alone(flown) if self.planner.options.track_record else None
         of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
         if alone is not None and (spoken := self._spoken_against(alone, flown, of_others)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -247,10 +248,12 @@ def _missed_predictions(experiments: Sequence[Experiment]) -> Iterator[Remark]:
 
 def _of_range(share: float) -> str:
     """How far a state is missed, beside how far it went: two digits of a share of 1 or more are no percentage."""
+    if not math.isfinite(share):
+        return "though it stood still"
     return (
-        f"{two_digits(100.0 * share)} % of its range"
+        f"up to {two_digits(100.0 * share)} % of its range"
         if share < 0.995
-        else f"{two_digits(share)} times its range"
+        else f"up to {two_digits(share)} times its range"
     )
 
 
@@ -261,7 +264,7 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
         what = f"diverges on {max(miss.flights for miss in worst if miss.diverges)}"
     else:
         named = [
-            f"{signals.state_names[miss.state]} on {miss.flights} (up to {_of_range(miss.share)},"
+            f"{signals.state_names[miss.state]} on {miss.flights} ({_of_range(miss.share)},"
             f" {two_digits(miss.times)} times what noise and disturbances explain)"
             for miss in worst[:NAMED]
         ]

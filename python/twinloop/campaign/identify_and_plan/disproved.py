@@ -48,8 +48,10 @@ def disproved(planner: Planner, committee: Committee, book: Logbook, good: float
 def _expected(planner: Planner, committee: Committee, test: Test) -> tuple[float, float]:
     """Quality that the committee of now expects of a flight that was flown, and its standard deviation."""
     excitation = None if test.excitation is None else test.excitation[np.newaxis]
+    # One that diverges in a flight that went to its end says nothing of how good it was.
+    members = planner.stable_members(committee.members, test.genes[np.newaxis], excitation)
     judged = planner.judge(
-        committee.members, test.genes[np.newaxis], committee.sds, planner.options.draws, excitation,
+        members, test.genes[np.newaxis], committee.sds, planner.options.draws, excitation,
         measured=True, hold_back=test.hold_back,
     )  # fmt: skip
     return committee.moved_by_gusts(test).added_to(*expected(judged.qualities[:, :, 0]))

@@ -171,6 +171,7 @@ class Learner:
             models=(*models, identified.model),
             two_laws=two.laws,
             rough=two.rough,
+            explained=not doubted,
         )
         return replace(
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))

@@ -16,7 +16,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay
 from twinloop.law.noise import Noise
 from twinloop.law.twin import Twin
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 from twinloop.test import Test
 
 
@@ -64,6 +64,7 @@ class Learnt(Recorded, kind="learnt"):
         ensembles: what the bands of those twins are made of; what an older version wrote has none.
         two_laws: of those identifications whose flights no law explains, the best model of either kind.
         rough: the law of linear terms that was held last beside one that does not explain the flights; None: none was.
+        explained: whether a law explains the flights.
     """
 
     experiments: int
@@ -77,14 +78,19 @@ class Learnt(Recorded, kind="learnt"):
     ensembles: tuple[Ensemble, ...] = ()
     two_laws: tuple[TwoLaws, ...] = ()
     rough: Identified | None = None
+    explained: bool = True
 
-    VERSION = 2
+    VERSION = 3
     RENAMED: ClassVar[Mapping[str, str]] = {"told": "experiments"}
 
-    @property
-    def explained(self) -> bool:
-        """Whether a law explains the flights: where none does, the best model of either kind was kept of them."""
-        return not self.two_laws or self.two_laws[-1].experiments != self.experiments
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version: where no law explained the flights, two were kept of them."""
+        found = super().renewed(record)
+        two = found.get("two_laws")
+        last = two[-1] if isinstance(two, list) and two else None
+        compared = isinstance(last, dict) and last.get("experiments") == found.get("experiments")
+        return {**found, "explained": not compared}
 
     @property
     def inside(self) -> bool:

@@ -19,6 +19,8 @@ from twinloop.signals import Signals
 
 PARTS = 4
 """Of a log that is too long, of one length: it may move at several times."""
+SHORTEST = 8
+"""Readings of a part at least: of many logs fewer parts are taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,16 +116,17 @@ def _liveliest(run: Selected, most: int, signals: Signals) -> Selected:
 
     What moves is measured in variances, of each column within a part over that within the whole log.
     """
-    length = most // PARTS
     flown = run.experiment.trajectory
-    if run.readings <= most or length < 2:
+    if run.readings <= most:
         return run
+    parts = min(PARTS, max(1, most // SHORTEST))
+    length = max(SHORTEST, most // parts)
     columns = np.concatenate([signals.difference(flown.states[1:], flown.states[0]), flown.commands], axis=1)
     count = len(columns) // (length - 1)
     pieces = columns[: count * (length - 1)].reshape(count, length - 1, -1)
     whole = columns.var(axis=0)
     moves = np.divide(pieces.var(axis=1), whole, out=np.zeros((count, len(whole))), where=whole > 0.0)
-    chosen = np.sort(np.argsort(-moves.sum(axis=1), kind="stable")[:PARTS])
+    chosen = np.sort(np.argsort(-moves.sum(axis=1), kind="stable")[:parts])
     firsts = (chosen * (length - 1)).tolist()
     return Selected(run.experiment, tuple((first, first + length - 1) for first in firsts))
 

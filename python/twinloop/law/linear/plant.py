@@ -23,6 +23,8 @@ HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
 CLOSE = 1e-12
 """Of a command's size: steps that are no longer change nothing that anybody asks for."""
+ALIKE = 1e-5
+"""Effect of the difference between commands, over theirs, below which they are taken to do the same."""
 SETTLED = 1e-6
 """Share of what is left of a state's motion that a step must take away for another to follow."""
 
@@ -358,7 +360,7 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
     for _ in range(HALVINGS):
         n_x = law.signals.n_x
         reach = found.B[:n_x] * sizes / scales[:, np.newaxis]
-        step = np.linalg.lstsq(reach, -found.drift[:n_x] / scales, rcond=1e-9)[0] * sizes
+        step = _inwards(reach, -found.drift[:n_x] / scales, best <= low, best >= high) * sizes
         share = 1.0
         for _ in range(HALVINGS):
             tried = np.clip(best + share * step, low, high)
@@ -375,6 +377,24 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
         if settled:
             break
     return best
+
+
+def _inwards(reach: Floats, wanted: Floats, at_low: Floats, at_high: Floats) -> Floats:
+    """The shortest least-squares step of commands (n_u,) that leads none beyond a bound at which it is.
+
+    A command that goes beyond it downhill, or would be led there, stays, and the others do what they can without it
+    (projected steps of Newton, Bertsekas 1982).
+    """
+    downhill = reach.T @ wanted
+    step, free = np.zeros(reach.shape[1]), ~((at_low & (downhill < 0.0)) | (at_high & (downhill > 0.0)))
+    while free.any():
+        step[:] = 0.0
+        step[free] = np.linalg.lstsq(reach[:, free], wanted, rcond=ALIKE)[0]
+        stays = (at_low & (step < 0.0)) | (at_high & (step > 0.0))
+        if not stays.any():
+            break
+        free &= ~stays
+    return step
 
 
 def resting(law: Law) -> Floats:
