@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
@@ -379,7 +380,7 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
     return best
 
 
-def _inwards(reach: Floats, wanted: Floats, at_low: Floats, at_high: Floats) -> Floats:
+def _inwards(reach: Floats, wanted: Floats, at_low: NDArray[np.bool_], at_high: NDArray[np.bool_]) -> Floats:
     """The shortest least-squares step of commands (n_u,) that leads none beyond a bound at which it is.
 
     A command that goes beyond it downhill, or would be led there, stays, and the others do what they can without it
