@@ -300,6 +300,29 @@ def test_a_file_with_a_mistake_is_refused_with_what_to_do(folder, monkeypatch, p
     assert done.exit_code == 2 and word in done.stderr, done.output
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "word"),
+    [
+        ('"angle.kp" = 2.0', '"angle.kp" = 100.0', "expected 0 to"),
+        (
+            'axes = [["angle", "rate"]]',
+            'axes = [["angel", "rate"]]',
+            "state in the axes of [controller] 'angel'",
+        ),
+    ],
+)
+def test_a_file_with_a_mistake_begins_no_store_and_can_be_corrected(folder, right, wrong, word):
+    assert right in PENDULUM
+    written(folder, PENDULUM.replace(right, wrong))
+
+    refused = run("ask", "rig.db")
+
+    assert refused.exit_code == 2 and word in refused.stderr
+    assert not (folder / "rig.db").exists()
+    written(folder, PENDULUM)
+    assert run("ask", "rig.db").exit_code == 0
+
+
 def test_options_that_the_file_has_are_refused_beside_it(folder):
     written(folder, PENDULUM, section("rig:rig"))
     for option in (("--seed", "3"), ("--set", "lags=false"), ("--harsh",)):

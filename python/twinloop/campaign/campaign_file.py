@@ -158,8 +158,13 @@ class CampaignFile:
             others: arguments that no file holds, such as `store` or `threads`.
 
         Raises:
-            InvalidInput: the store holds another campaign, or its first test has other gains.
+            InvalidInput: gains of `[first]` that the controller has not; the store holds another campaign, or its first
+                test has other gains.
         """
+        if self.first:
+            # Before a store is begun that a corrected file would no longer agree with.
+            with at(f"Campaign file {self.path}, [first]"):
+                self.arguments["controller"].bind(self.arguments["signals"]).genes(dict(self.first))
         campaign = Campaign(**self.arguments, **others)
         try:
             self._check_first(campaign, campaign.store)
@@ -253,7 +258,7 @@ def read_file(path: str | Path, begun: System | None = None) -> CampaignFile:
     task = said_by(made, TASK, path) if own else _section(found, "task", TASK, TASK)
     arguments = {
         "signals": signals,
-        "controller": _controller(found["controller"])
+        "controller": _controller(found["controller"], signals)
         if "controller" in found
         else said_by(made, ("controller",), path)["controller"],
         **task,
@@ -380,13 +385,17 @@ def _tagged(table: Any, kind: Any) -> Any:
     return kind.from_record(record)
 
 
-def _controller(table: Any) -> UnboundFamily:
+def _controller(table: Any, signals: Signals | None) -> UnboundFamily:
     found = {"version": 1, **_table(table, "controller")}
     if isinstance(found.get("axes"), list):
         axes = [[axis] if isinstance(axis, str) else axis for axis in found["axes"]]
         found["axes"] = [
             [*axis, None] if isinstance(axis, list) and len(axis) == 1 else axis for axis in axes
         ]
+        # Gains are named after axes: of a mistyped one its gains are not what is wrong.
+        for name in (name for axis in found["axes"] if isinstance(axis, list) for name in axis):
+            if signals is not None and isinstance(name, str) and name not in signals.state_names:
+                raise unknown("state in the axes of [controller]", name, signals.state_names)
     if isinstance(found.get("output"), Mapping):
         found["output"] = {"kind": "mixer", "version": 1, **found["output"]}
     with at("Campaign file, [controller]"):

@@ -55,6 +55,21 @@ def test_what_an_exact_simulator_flies_again_is_no_copy_of_its_first_flight(plac
     assert not copied(saved_again(one, lambda x: np.round(x, digits)), one, PENDULUM_SIGNALS)
 
 
+@given(place=anywhere["place"], seed=anywhere["seed"], column=st.sampled_from([0, 1]), noise=NOISES)
+def test_a_column_that_a_historian_has_rounded_hides_no_copy_and_makes_none(place, seed, column, noise):
+    def coarse(readings):
+        rounded = readings.copy()
+        if rounded.shape[1] > 1:
+            rounded[:, column] = 2.0 * noise * np.round(rounded[:, column] / (2.0 * noise))
+        return rounded
+
+    test = asked_at(place, quiet=True)
+    run = flown(test, noise, seed)
+    for one, other in ((saved_again(run, coarse), run), (run, saved_again(run, coarse))):
+        assert copied(one, other, PENDULUM_SIGNALS)
+    assert not copied(saved_again(flown(test, noise, seed + 100), coarse), run, PENDULUM_SIGNALS)
+
+
 @pytest.mark.parametrize("steps", [3, 19])
 def test_of_so_few_steps_nobody_can_say(steps):
     run = flown(asked_at((0.5, 0.5, 0.5), quiet=True), 1e-2, 0)

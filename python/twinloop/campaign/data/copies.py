@@ -15,6 +15,8 @@ LIKE = 0.25
 """Share of a sensor's noise that two records of one flight differ by at most, root mean square; two flights: 1.4."""
 ROUNDED = 0.01
 """The same for a reading without noise, as a share of its own spread, and for a command, of the width of its bounds."""
+STEPPED = 0.35
+"""The same for a column that was saved in steps, as a share of one: rounding leaves 1 / √12."""
 FEWEST = 20
 """Steps from which on noise is told from motion."""
 AS_LARGE = 3.0
@@ -46,12 +48,16 @@ def copied(one: Trajectory, other: Trajectory, signals: Signals) -> bool:
     for i in signals.measured:
         columns = [states[:, i] for states in pair]
         # What rounding alone scatters, in one of the two, is no noise of the flight.
-        if all(scatters([readings], AS_LARGE) for readings in columns):
-            noisy = True
-            if apart[i] > LIKE * min(_noise(readings) for readings in columns):
-                return False
-        elif apart[i] > ROUNDED * min(float(readings.std()) for readings in columns):
+        scattering = all(scatters([readings], AS_LARGE) for readings in columns)
+        like = (
+            LIKE * min(_noise(readings) for readings in columns)
+            if scattering
+            else ROUNDED * min(float(readings.std()) for readings in columns)
+        )
+        # A column that was rounded coarsely says nothing of its noise; others have to.
+        if apart[i] > max(like, STEPPED * max(_step(readings) for readings in columns)):
             return False
+        noisy |= bool(scattering and apart[i] <= like)
     return noisy
 
 
@@ -82,6 +88,12 @@ def _size(differences: Floats) -> Floats:
     """Root mean square of each column of (n, m): (m,)."""
     size: Floats = np.sqrt(np.square(differences).mean(axis=0))
     return size
+
+
+def _step(readings: Floats) -> float:
+    """The least by which two readings (n,) differ; 0 where all are equal."""
+    gaps = np.diff(np.unique(readings))
+    return float(gaps.min()) if gaps.size else 0.0
 
 
 def _noise(readings: Floats) -> float:
