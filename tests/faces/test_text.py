@@ -129,11 +129,15 @@ def test_a_result_of_default_says_what_a_person_must_know():
     [
         (
             {},
-            "0.5 rad s, 25 % of what it is now.\nThat is above the scatter of one measurement, 0.1 rad s",
+            "0.5 rad s, 25 % of what it is now.\nThat is above what the sensors alone scatter one measurement by,"
+            " 0.1 rad s",
         ),
-        ({"gain": 0.01, "share": None, "stop": True}, "by 0.01 rad s.\nThat is below the scatter"),
+        (
+            {"gain": 0.01, "share": None, "stop": True},
+            "by 0.01 rad s.\nThat is below what the sensors alone scatter",
+        ),
         ({"gain": 0.0, "stop": True}, "would not have improved\nthe quality. For the controller, stop."),
-        ({"gain": 0.0, "stop": True}, "stop.\nThe scatter of one measurement is 0.1 rad s."),
+        ({"gain": 0.0, "stop": True}, "stop.\nThe sensors alone scatter one measurement by 0.1 rad s."),
         ({"gain": 0.0, "stop": True}, "Next: fly this controller, then stop; another flight"),
         ({"trusted": False}, "Next: look into the remarks, then fly another test"),
         ({"trusted": False}, "it cannot say. Look into the remarks, then fly another test."),

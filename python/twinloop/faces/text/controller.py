@@ -116,14 +116,15 @@ def advice_words(result: Mapping[str, Any]) -> str:
     size = None if scatter is None else with_unit(scatter, unit)
     if advice["gain"] == 0.0:
         stop = f" {_stop(result)}" if advice["stop"] else ""
-        scattered = "" if size is None else f"\nThe scatter of one measurement is {size}."
+        scattered = "" if size is None else f"\nThe sensors alone scatter one measurement by {size}."
         return f"{words} not have improved\nthe quality.{stop}{scattered}"
     words += f" have improved the quality\nby {with_unit(advice['gain'], unit)}{share}."
     if size is None:
         return words
+    by_sensors = f"what the sensors alone scatter one measurement by, {size}"
     if advice["stop"]:
-        return f"{words}\nThat is below the scatter of one measurement, {size}. {_stop(result)}"
-    return f"{words}\nThat is above the scatter of one measurement, {size}: another experiment may pay."
+        return f"{words}\nThat is below {by_sensors}. {_stop(result)}"
+    return f"{words}\nThat is above {by_sensors}: another experiment may pay."
 
 
 def _stop(result: Mapping[str, Any]) -> str:
