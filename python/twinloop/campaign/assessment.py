@@ -39,8 +39,7 @@ class Advice:
             commands act in it; if not, there is no advice.
         gain: improvement of the quality if it were known which model is right; None without a committee.
         share: `gain` over the quality of the controller to fly; None if either is unknown.
-        scatter: standard deviation of the quality of a repeated flight, by the noise of its sensors alone; None if it is
-            unknown.
+        scatter: standard deviation of the quality of a repeated flight, by sensors' noise alone; None: it is unknown.
         stop: whether the gain is below the scatter, so that for the controller another experiment does not pay. None
             if this is unknown.
     """

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from twinloop.campaign.data import righted
 from twinloop.campaign.data.sent import OTHER, change_that_rights, other_commands, sent_and_asked
 from twinloop.campaign.examination.log_check import against
 
@@ -104,6 +105,17 @@ def test_commands_that_a_controller_would_have_held_at_their_bound_are_not_said_
     """In kelvin the heater would always be off: a heater that is divided by much is nearly off, too."""
     (sentence,) = said(recorded(STATES + np.array([273.15, 0.0])))
     assert "They would be" not in sentence
+
+
+def test_a_column_that_hardly_moves_is_not_said_to_be_a_command_that_would_hardly_have_moved(monkeypatch):
+    """Of a tank at 100 degrees the heater would have been off, and the level is near to that for a heater's."""
+    calm = np.column_stack([STATES[:, 0] + 300.0, np.full(len(STATES), 2.0)])
+    run = recorded(calm, np.column_stack([np.full(len(COMMANDS), 60.0), np.zeros(len(COMMANDS))]))
+
+    assert change_that_rights(run) == ""
+
+    monkeypatch.setattr(righted, "FOLLOWED", np.inf)
+    assert change_that_rights(run) != ""
 
 
 def test_of_what_no_change_of_a_column_explains_none_is_named():

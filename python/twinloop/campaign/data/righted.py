@@ -18,6 +18,9 @@ from twinloop.unmeasured import completed_readings
 
 LITTLE = 0.02
 """Share of their bounds by which commands may differ whatever they do."""
+FOLLOWED = 0.1
+"""Share of what the controller's commands do, in squares, that recorded ones may leave of it after a change: one that
+stands still is near to many that hardly move."""
 FACTORS = (*UNITS, *(1.0 / unit for unit in UNITS))
 
 
@@ -123,9 +126,17 @@ def nearest(test: Test, run: Trajectory, changes: Iterator[Change]) -> str:
 
 
 def _off(test: Test, change: Change) -> float:
-    """How far its commands are from those of the controller, whatever became of the excitation."""
-    asked = [given(as_excited(test, how), change.states) for how in hows(test)]
-    return min(float(apart(change.commands, each, test).mean()) for each in asked)
+    """How far its commands are from those of the controller, whatever became of the excitation.
+
+    Infinitely far where they do not follow them.
+    """
+    found = np.inf
+    for how in hows(test):
+        asked = given(as_excited(test, how), change.states)
+        off = float(apart(change.commands, asked, test).mean())
+        if off <= FOLLOWED * float(apart(asked, asked.mean(axis=0), test).mean()):
+            found = min(found, off)
+    return found
 
 
 def _scaled(signals: Signals, run: Trajectory, factor: float) -> Iterator[Change]:
