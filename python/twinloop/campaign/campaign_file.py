@@ -161,7 +161,8 @@ class CampaignFile:
             InvalidInput: gains of `[first]` that the controller has not; the store holds another campaign, or its first
                 test has other gains.
         """
-        if self.first:
+        store = others.get("store")
+        if self.first and not (store and Path(store).exists()):
             # Before a store is begun that a corrected file would no longer agree with.
             with at(f"Campaign file {self.path}, [first]"):
                 self.arguments["controller"].bind(self.arguments["signals"]).genes(dict(self.first))
