@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import to_type
 from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
@@ -15,7 +16,7 @@ from twinloop.campaign.differing import differences
 from twinloop.campaign.keeping import as_begun, check_setup
 from twinloop.campaign.presets import PRESETS
 from twinloop.campaign.system_section import SystemSection, said_by, system_section
-from twinloop.controllers import UnboundFamily
+from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, at, unknown
 from twinloop.records import read
 from twinloop.signals import Command as Channel
@@ -164,8 +165,7 @@ class CampaignFile:
         store = others.get("store")
         if self.first and not (store and Path(store).exists()):
             # Before a store is begun that a corrected file would no longer agree with.
-            with at(f"Campaign file {self.path}, [first]"):
-                self.arguments["controller"].bind(self.arguments["signals"]).genes(dict(self.first))
+            self.first_genes(self.arguments["controller"].bind(self.arguments["signals"]))
         campaign = Campaign(**self.arguments, **others)
         try:
             self._check_first(campaign, campaign.store)
@@ -173,6 +173,18 @@ class CampaignFile:
             campaign.close()
             raise
         return campaign
+
+    def first_genes(self, family: Family) -> Floats:
+        """The gains of `[first]` (size,).
+
+        Args:
+            family: that they are gains of.
+
+        Raises:
+            InvalidInput: gains that it has not.
+        """
+        with at(f"Campaign file {self.path}, [first]"):
+            return family.genes(dict(self.first))
 
     def check(self, known: Campaign, store: str, name: str) -> None:
         """Refuses a campaign that was begun with something else, in the words of `campaign`.

@@ -20,8 +20,8 @@ def first_test(campaign: Campaign, file: CampaignFile) -> Test:
         InvalidInput: gains that the controller has not, or those of a test that failed.
         StoreFailure: the store cannot be written.
     """
+    first = file.first_genes(campaign.family)
     with at(f"Campaign file {file.path}, [first]"):
-        first = campaign.family.genes(dict(file.first))
         for failure in campaign.failures:
             if failure.test.genes.tobytes() == first.tobytes():
                 back = next_command(campaign, "withdraw", failure.test.number, "--reason", "WHY")

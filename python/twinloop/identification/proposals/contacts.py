@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.drives import drive
-from twinloop.identification.search.noise import first_noise, still
+from twinloop.identification.search.noise import still
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.search.selection import from_below, from_both_sides
 from twinloop.identification.search.structure import search
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, begun, damped, entered, hinges, limits
@@ -86,15 +85,9 @@ def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) 
     grown = hypothesis.candidates.growing()
     places = {entered(grown.pool, hinge, len(every)): hinge for hinge in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places), fit=None)
-    problem, options, first = Problem(context, tried), context.options, tried.candidates.ladder[0]
-    usable = problem.usable(first)
-    below = side_by_side(
-        lambda found: first_noise(problem, found.chain, usable, options.gusts),
-        tried.sums,
-        context.workers.threads,
-    )
-    walks = context.walks(tried.next_unit(context.unit), options.moves // 4)
-    sums = search(problem, below, first, tried.sums, walks)
+    walks = context.walks(tried.next_unit(context.unit), context.options.moves // 4)
+    chains = [found.chain for found in tried.sums]
+    sums = from_below(context, Problem(context, tried), tried.candidates.ladder[0], chains, tried.sums, walks)
     near = (subset for found in sums for subset, above in found.subsets if above < NEAR)
     return [
         places[term] for term in dict.fromkeys(term for subset in near for term in subset) if term in places

@@ -7,14 +7,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.noise import first_noise
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import from_both_sides
-from twinloop.identification.search.structure import search
+from twinloop.identification.search.selection import from_below, from_both_sides
 from twinloop.identification.starts import GROWTH
 from twinloop.identification.terms.exponentials import FINER, Exponential, entered, finer
 from twinloop.identification.terms.exponentials import exponentials as all_exponentials
@@ -66,21 +63,13 @@ def _showing(
     grown = hypothesis.candidates.growing()
     places = {entered(grown.pool, one, len(every)): one for one in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places))
-    problem, options, terms = Problem(context, tried), context.options, tried.candidates.ladder[0]
-    usable = problem.usable(terms)
-    below = side_by_side(
-        lambda chain: first_noise(problem, chain, usable, options.gusts),
-        tried.driven,
-        context.workers.threads,
+    walks = context.walks(tried.next_unit(context.unit), context.options.moves // 4)
+    nothing = [None] * len(tried.driven)
+    sums = from_below(
+        context, Problem(context, tried), tried.candidates.ladder[0], tried.driven, nothing, walks
     )
-    walks = context.walks(tried.next_unit(context.unit), options.moves // 4)
-    sums = search(problem, below, terms, [None] * len(below), walks)
-    return [
-        [
-            places[term]
-            for term in next(
-                filter(None, ([t for t in each.terms if t in places] for each in found.subsets)), ()
-            )
-        ]
+    showing = (
+        next(filter(None, ([t for t in each.terms if t in places] for each in found.subsets)), [])
         for found in sums
-    ]
+    )
+    return [[places[term] for term in own] for own in showing]
