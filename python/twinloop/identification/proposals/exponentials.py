@@ -10,8 +10,10 @@ from dataclasses import replace
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.noise import first_noise
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import from_below, from_both_sides
+from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.search.structure import search
 from twinloop.identification.starts import GROWTH
 from twinloop.identification.terms.exponentials import FINER, Exponential, entered, finer
 from twinloop.identification.terms.exponentials import exponentials as all_exponentials
@@ -65,9 +67,9 @@ def _showing(
     tried = replace(hypothesis, candidates=grown.with_terms(places))
     walks = context.walks(tried.next_unit(context.unit), context.options.moves // 4)
     nothing = [None] * len(tried.driven)
-    sums = from_below(
-        context, Problem(context, tried), tried.candidates.ladder[0], tried.driven, nothing, walks
-    )
+    problem, terms = Problem(context, tried), tried.candidates.ladder[0]
+    below = first_noise(problem, tried.driven, terms, context.options.gusts)
+    sums = search(problem, below, terms, nothing, walks)
     showing = (
         next(filter(None, ([t for t in each.terms if t in places] for each in found.subsets)), [])
         for found in sums

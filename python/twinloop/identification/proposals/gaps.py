@@ -214,7 +214,7 @@ def _described(screen: Screen, pair: Sources, place: int) -> Iterator[Hypothesis
     tried, problem = screen.behind(pair)
     pool, found = tried.pool, tried.sums[place]
     usable = problem.usable([pool.one, *range(pool.inputs), pool.hidden(0)])
-    chain = first_noise(problem, found.chain, usable, gusts=False)
+    [chain] = first_noise(problem, [found.chain], usable, gusts=False)
     weights = weighed(problem, chain, usable)
     if weights is not None:
         yield _with_sum(tried, place, replace(found, chain=chain, weights=weights, others=[]))

@@ -194,7 +194,7 @@ def _undisturbed(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesi
     """The same with the noise of a fit without lasting disturbances, if there are any: they hide what is stored."""
     problem, terms = Problem(context, hypothesis), hypothesis.candidates.ladder[0]
     if any(lasts(problem, found.chain) for found in hypothesis.sums):
-        chains = [first_noise(problem, found.chain, terms, gusts=False) for found in hypothesis.sums]
+        chains = first_noise(problem, [found.chain for found in hypothesis.sums], terms, gusts=False)
         sums = zip(hypothesis.sums, chains, strict=True)
         yield replace(hypothesis, sums=tuple(replace(found, chain=chain) for found, chain in sums))
 

@@ -119,7 +119,7 @@ class _Trial:
     @staticmethod
     def of(problem: Problem, signals: Signals, chain: Chain, base: list[int]) -> _Trial:
         """With the noise that the terms leave."""
-        quiet = first_noise(problem, chain, base, gusts=False)
+        [quiet] = first_noise(problem, [chain], base, gusts=False)
         solved = problem.gram(quiet, problem.values(base)).solve(list(range(len(base))), RIDGE)
         place, stages = chain.states[0], problem.stages
         start, middle, end = (

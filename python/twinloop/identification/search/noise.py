@@ -11,6 +11,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop._ground.side_by_side import side_by_side
 from twinloop.identification.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.sensors.chains import Chain, Motion
@@ -72,35 +73,42 @@ def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
     return chain.with_noise(sensors, motion)
 
 
-def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: bool = True) -> Chain:
+def first_noise(
+    problem: Problem, chains: Sequence[Chain], terms: Sequence[int], gusts: bool = True
+) -> list[Chain]:
     """The noise that a fit of all terms leaves, corrected for its degrees of freedom.
 
     Args:
-        problem: of the chain.
-        chain: with a first guess of its sensors' noise.
+        problem: of the chains.
+        chains: with a first guess of their sensors' noise.
         terms: of which the usable ones are fitted.
         gusts: whether disturbances may last.
 
     Returns:
-        The chain with its noise estimated.
+        The chains with their noise estimated.
     """
     usable = problem.usable(terms)
-    regression = problem.regression(chain, problem.values(usable))
-    low, slow = floor_of(chain, problem.dt, problem.integration(chain))
-    sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
-    readings = problem.readings(chain)
-    for _ in range(2):
-        gram = regression.gram(sensors, motion, problem.workers)
-        solved = gram.solve(list(range(len(usable))), RIDGE)
-        if solved is None:
-            break
-        ((sensors, found, _),) = _core.most_likely_noises(
-            [(regression, solved[0], sensors, motion, low, slow)], problem.workers
-        )
-        motion = Motion(*found)
-        used = min(len(usable), 0.7 * readings)
-        sensors = sensors * readings / (readings - used)
-    return chain.with_noise(sensors, motion)
+
+    def left(chain: Chain) -> Chain:
+        regression = problem.regression(chain, problem.values(usable))
+        low, slow = floor_of(chain, problem.dt, problem.integration(chain))
+        sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
+        readings = problem.readings(chain)
+        for _ in range(2):
+            gram = regression.gram(sensors, motion, problem.workers)
+            solved = gram.solve(list(range(len(usable))), RIDGE)
+            if solved is None:
+                break
+            ((sensors, found, _),) = _core.most_likely_noises(
+                [(regression, solved[0], sensors, motion, low, slow)], problem.workers
+            )
+            motion = Motion(*found)
+            used = min(len(usable), 0.7 * readings)
+            sensors = sensors * readings / (readings - used)
+        return chain.with_noise(sensors, motion)
+
+    # Chains share nothing but the values of their terms.
+    return side_by_side(left, chains, problem.workers.threads)
 
 
 def _begun(chain: Chain, low: Floats, slow: Motion, dt: float, gust: float) -> tuple[Floats, Motion]:

@@ -20,8 +20,6 @@ from twinloop.identification.search.noise import calm, first_noise, unexplained
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
-from twinloop.identification.search.walks import Walks
-from twinloop.identification.sensors.chains import Chain
 
 
 def from_both_sides(
@@ -41,7 +39,8 @@ def from_both_sides(
     terms, nothing = hypothesis.candidates.ladder[0], [None] * len(hypothesis.driven)
     threads = context.workers.threads
     walks = context.walks(hypothesis.next_unit(context.unit), options.moves, starts=2)
-    low = hypothesis.searched(from_below(context, problem, terms, hypothesis.driven, known or nothing, walks))
+    below = first_noise(problem, hypothesis.driven, terms, options.gusts)
+    low = hypothesis.searched(search(problem, below, terms, known or nothing, walks))
     if not options.noise_from_above:
         return replace(low, from_above=low.sums)
     above = side_by_side(lambda chain: unexplained(problem, chain, options.gusts), hypothesis.driven, threads)
@@ -53,32 +52,6 @@ def from_both_sides(
         sums=tuple(shortest(pair, lambda found: found.description_length) for pair in both),
         from_above=high.sums,
     )
-
-
-def from_below(
-    context: Context,
-    problem: Problem,
-    terms: Sequence[int],
-    chains: Sequence[Chain],
-    known: Sequence[Sum | None],
-    walks: Walks,
-) -> list[Sum]:
-    """The best sum of terms for each chain, with the noise to begin with that they leave if all are used.
-
-    Args:
-        context: of the identification.
-        problem: of all chains.
-        terms: to choose from.
-        chains: behind the outputs.
-        known: for each chain a sum that is known, or None.
-        walks: over subsets of terms.
-    """
-    usable, gusts = problem.usable(terms), context.options.gusts
-    # Chains share nothing but the values of their terms.
-    below = side_by_side(
-        lambda chain: first_noise(problem, chain, usable, gusts), chains, context.workers.threads
-    )
-    return search(problem, below, terms, known, walks)
 
 
 def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hypothesis:
