@@ -757,6 +757,38 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
     assert same(tl.load(tmp_path / "LOG.NPZ", SIGNALS), run)
 
 
+def test_a_log_whose_columns_have_other_names_is_told_attached_checked_and_withdrawn_as_it_is(folder):
+    run("ask", "rig.db")
+    flight = flown(look().tests[0])
+    theirs = {"t": "Time (s)", "angle": "IMU pitch", "rate": "wy", "torque": "Out 1"}
+    log = folder / "flight.csv"
+    text = log.read_text(encoding="utf-8")
+    head, _, body = text.partition("\n")
+    log.write_text(
+        ",".join(theirs[name] for name in head.split(",")) + ",Out 2\n" + body.replace("\n", ",7\n"),
+        encoding="utf-8",
+    )
+    refused = run("tell", "rig.db", "0", "flight.csv")
+    assert refused.exit_code == 2 and "under [log] of the campaign file" in refused.output
+
+    # It may be said at any time: nothing that is known of the campaign changes.
+    lines = ["[log]", *(f'{name} = "{column}"' for name, column in theirs.items())]
+    with open("rig.toml", "a", encoding="utf-8") as file:
+        file.write("\n".join(["", *lines, ""]))
+    assert run("check", "flight.csv", "rig.toml", "-o", "own.csv").exit_code == 0
+    assert same(tl.load("own.csv", SIGNALS).states, flight.states)
+    told = run("tell", "rig.db", "0", "flight.csv")
+    assert told.exit_code == 0, told.output
+    assert same(look().experiments[0].trajectory.states, flight.states)
+    assert same(look().experiments[0].trajectory.commands, flight.commands)
+    assert run("withdraw", "rig.db", "flight.csv", "--reason", "a test").exit_code == 0
+    assert run("attach", "rig.db", "flight.csv").exit_code == 0 and look().experiments[0].attached
+    assert run("withdraw", "rig.db", "flight.csv", "--reason", "a test").exit_code == 0
+    assert not look().experiments
+    # One with the signals' own names needs no others.
+    assert run("tell", "rig.db", "0", "own.csv").exit_code == 0
+
+
 @pytest.mark.parametrize("mark", ["\v", "\f", "\x1c", "\x85", "\u2028"])
 def test_a_note_may_hold_any_mark_and_a_line_end_in_quotes(tmp_path, mark):
     text = f't,angle,rate,torque,note\n0,1,0,0,"two\nlines"\n0.05,2,0,0,a{mark}b\n0.1,3,0,,c\n'

@@ -105,7 +105,8 @@ seed = 0
 # quality = "iae"                # "iae", "ise" or "final_distance"
 # weights = {{ angle = 2.0 }}      # of states in it; by default 1, of rates 0, each in units of its scale
 
-# [log]                          # of a log of PX4 (.ulg): the field of each state and command; q of a topic as angles
+# [log]                          # what t, states and commands are called in logs, where not so: columns of CSV, or of a
+#                                # log of PX4 (.ulg) the field of each; q of a topic as angles
 # angle = "vehicle_attitude.pitch"
 # rate = "vehicle_angular_velocity.xyz[1]"
 # torque = "vehicle_torque_setpoint.xyz[1]"
@@ -310,7 +311,7 @@ def read_signals(path: str | Path) -> tuple[Signals, Mapping[str, Any]]:
 
 
 def read_fields(path: str | Path) -> Mapping[str, str]:
-    """What a campaign file says of the fields of an autopilot's log, by signal; nothing where it has no [log].
+    """What a campaign file says of the columns or fields of logs, by signal; nothing where it has no [log].
 
     Args:
         path: of the file.

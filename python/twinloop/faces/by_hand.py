@@ -21,7 +21,7 @@ from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.files import check_writable
 from twinloop.faces.first_test import first_test
 from twinloop.faces.from_file import file_beside
-from twinloop.faces.opening import opened_by_hand
+from twinloop.faces.opening import fields_beside, opened_by_hand
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import facts, foretold, sheet
 from twinloop.faces.telling import (
@@ -182,7 +182,7 @@ def tell(
     log = _told(store, name, test, flight, failed, aborted, reason)
     with closing(opened_by_hand(store, name)) as campaign:
         if failed is not None:
-            asked, read = tell_failed(campaign, test, failed, log)
+            asked, read = tell_failed(campaign, test, failed, log, fields_beside(store))
         else:
             assert log is not None  # refused above
             asked, read = tell_flight(
@@ -191,6 +191,7 @@ def tell(
                 log,
                 aborted="" if aborted is None else STOPPED if reason is None else reason,
                 otherwise=f"record a test that was stopped early: {_aborted(store, name, test, log, 'why')}",
+                columns=fields_beside(store),
             )
         text = (
             f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {counted(campaign)} in"
@@ -254,7 +255,7 @@ def _aborted(store: str, name: str | None, test: int, log: Path, why: str) -> st
 def attach(store: str, flight: Path, name: str | None, as_json: bool) -> None:
     """Add a recorded FLIGHT without a test, as CSV or .npz."""
     with closing(opened_by_hand(store, name)) as campaign:
-        read = attach_flight(campaign, flight)
+        read = attach_flight(campaign, flight, columns=fields_beside(store))
         text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
         remarks = against_it(campaign, campaign.experiments[-1], None, read)
         answer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -9,7 +10,7 @@ import click
 from twinloop._ground.texts import to_type
 from twinloop.campaign import Campaign
 from twinloop.campaign.agreement import check_agreement
-from twinloop.campaign.campaign_file import read_file
+from twinloop.campaign.campaign_file import read_fields, read_file
 from twinloop.campaign.keeping import gone_on_with, look
 from twinloop.errors import InvalidInput
 from twinloop.faces.from_file import file_beside
@@ -49,6 +50,19 @@ def opened_by_hand(store: str, name: str | None = None, threads: int | None = No
         f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
         f" {to_type('new', file)}."
     )
+
+
+def fields_beside(store: str) -> Mapping[str, str]:
+    """What the columns of logs are called, by signal, by the campaign file beside a store; nothing where none says so.
+
+    Args:
+        store: a file, or the address of a server.
+
+    Raises:
+        InvalidInput: the file cannot be read.
+    """
+    file = file_beside(store)
+    return read_fields(file) if file is not None and file.is_file() else {}
 
 
 def opened_to_look(store: str, name: str | None) -> tuple[Campaign, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +62,7 @@ def tell(
     aborted: str = "",
     name: str | None = None,
     otherwise: str = "say why it was stopped",
+    columns: Mapping[str, str] | None = None,
 ) -> tuple[Test, Log]:
     """Tells the flight of a test.
 
@@ -72,6 +73,7 @@ def tell(
         aborted: why the test was stopped before its end; empty where it was not.
         name: what messages call the log; None: its path.
         otherwise: what to do with a log that ends early, if it cannot be had whole.
+        columns: what its columns are called, where not as the signals are.
 
     Returns:
         The test, and the log as it was read.
@@ -84,7 +86,7 @@ def tell(
     test = numbered(campaign, number)
     called = str(log) if name is None else name
     ended = "aborted" if aborted else "completed"
-    found = read_log(log, campaign.signals, called)
+    found = read_log(log, campaign.signals, called, columns)
     run = found.trajectory(ended, aborted)
     if not aborted and run.steps < test.steps:
         if run.steps:
@@ -101,13 +103,16 @@ def tell(
     return test, found
 
 
-def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> Log:
+def attach(
+    campaign: Campaign, log: Path, *, name: str | None = None, columns: Mapping[str, str] | None = None
+) -> Log:
     """Attaches a flight without a test.
 
     Args:
         campaign: that is to learn it.
         log: CSV or .npz.
         name: what messages call the log; None: its path.
+        columns: what its columns are called, where not as the signals are.
 
     Returns:
         The log as it was read.
@@ -117,7 +122,7 @@ def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> Log:
         StoreFailure: the store cannot be written.
     """
     called = str(log) if name is None else name
-    found = read_log(log, campaign.signals, called)
+    found = read_log(log, campaign.signals, called, columns)
     run = found.trajectory()
     _refuse_told(campaign, run, called, None)
     with found.errors():
@@ -126,7 +131,11 @@ def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> Log:
 
 
 def tell_failed(
-    campaign: Campaign, number: int, reason: str, log: Path | None = None
+    campaign: Campaign,
+    number: int,
+    reason: str,
+    log: Path | None = None,
+    columns: Mapping[str, str] | None = None,
 ) -> tuple[Test, Log | None]:
     """Tells that a test failed.
 
@@ -135,6 +144,7 @@ def tell_failed(
         number: of the test.
         reason: in a few words.
         log: CSV or .npz with what was recorded; None: nothing.
+        columns: what its columns are called, where not as the signals are.
 
     Returns:
         The test, and the log as it was read.
@@ -160,7 +170,7 @@ def tell_failed(
     if log is None:
         campaign.tell_failed(test, reason)
         return test, None
-    found = read_log(log, campaign.signals)
+    found = read_log(log, campaign.signals, None, columns)
     run = found.trajectory("aborted", reason)
     with found.errors():
         campaign.tell_failed(test, reason, run)

@@ -13,6 +13,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option, name_option, next_command
+from twinloop.faces.opening import fields_beside
 from twinloop.faces.telling import counted
 from twinloop.logs import read_log
 from twinloop.store import shown_name
@@ -38,7 +39,7 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
     """
     with closing(Campaign.load(store, name)) as campaign:
         before = campaign.experiments
-        campaign.withdraw(chosen(campaign, which), reason)
+        campaign.withdraw(chosen(campaign, which, fields_beside(store)), reason)
         test = campaign.withdrawals[-1].test
         others = [run for run in campaign.experiments if test is not None and run.number == test]
         failures = [each for each in campaign.failures if each.test.number == test and not each.recorded]
@@ -61,12 +62,13 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
         answer(facts, "\n".join(lines), as_json)
 
 
-def chosen(campaign: Campaign, which: str) -> int | Experiment:
+def chosen(campaign: Campaign, which: str, columns: Mapping[str, str] | None = None) -> int | Experiment:
     """The flight that somebody names.
 
     Args:
         campaign: that it was recorded in.
         which: number of a test, attached-N, or a log.
+        columns: what the columns of a log are called, where not as the signals are.
 
     Raises:
         InvalidInput: no such flight.
@@ -77,7 +79,7 @@ def chosen(campaign: Campaign, which: str) -> int | Experiment:
     if place is not None and (found := attached.get(_attached_name(int(place[1])))):
         return found
     if place is None and Path(which).is_file():
-        run = read_log(Path(which), campaign.signals).trajectory()
+        run = read_log(Path(which), campaign.signals, None, columns).trajectory()
         equal = [each for each in campaign.experiments if recorded_as(run, each.trajectory, campaign.signals)]
         if equal:
             return equal[-1]

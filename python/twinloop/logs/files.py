@@ -16,7 +16,7 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop._ground.writing import write_whole
 from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
-from twinloop.logs.headers import advice, listed
+from twinloop.logs.headers import advice, in_other_units, listed, renamed
 from twinloop.logs.missing import filled
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
@@ -28,6 +28,7 @@ TIME = "t"
 """Name of the column of times, s."""
 DELIMITERS = ",;\t"
 WHOLE = Window()
+ELSEWHERE = " What they are called may also be said under [log] of the campaign file."
 MOST_BYTES = 200_000_000
 """Of a log, unpacked: an hour of twenty signals at a kilohertz, as text."""
 
@@ -96,9 +97,10 @@ def load(
 ) -> Trajectory:
     """A recorded flight from a file.
 
-    A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order; other
-    columns are ignored, states that are not measured may be missing, and the commands of the last row may be empty. If
-    the file ends within a row, at a number that may be a part of one, it is refused. A file of NumPy (`.npz`) has
+    A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order, or what
+    `columns` says that they are called there; other columns are ignored, states that are not measured may be missing,
+    and the commands of the last row may be empty. If the file ends within a row, at a number that may be a part of
+    one, it is refused. A file of NumPy (`.npz`) has
     arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), whose last row is ignored.
     Single readings may be missing (an empty cell, or NaN), up to a twentieth of a state's: each is taken half-way
     between those before and after, and a `RemarkWarning` says how many.
@@ -116,7 +118,8 @@ def load(
         reason: why it did not complete.
         name: of the log in messages; None: its path.
         columns: of a `.ulg` the field of each state and command, such as {"roll": "vehicle_attitude.roll", "motor":
-            "actuator_outputs/1.output[0]"}, in the units of the signals.
+            "actuator_outputs/1.output[0]"}; of a CSV file the column of `t`, a state or a command that has another
+            name there, such as {"t": "Time", "roll": "Roll (rad)"}. All are in the units of the signals.
         start: of a `.ulg`, s after its beginning; None: when all fields have begun.
         stop: of a `.ulg`, s after its beginning; None: when the first field ends.
 
@@ -146,7 +149,7 @@ def read_log(
         path: of the file.
         signals: names of the columns, and the order of states and commands.
         name: of the log in messages; None: its path.
-        columns: of a `.ulg` the field of each state and command.
+        columns: of a `.ulg` the field of each state and command; of a CSV file the columns that have other names.
         window: of a `.ulg`, the part that is meant.
 
     Raises:
@@ -165,19 +168,27 @@ def read_log(
             raise InvalidInput(
                 f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."
             )
-        t, states, commands, lines = (
-            (*_arrays(path, called), None)
-            if path.suffix.lower() == ".npz"
-            else _columns(path, called, signals)
-        )
+        mapped: Mapping[str, str] = {}
+        lines: Sequence[int] | None = None
+        if path.suffix.lower() == ".npz":
+            t, states, commands = _arrays(path, called)
+        else:
+            t, states, commands, lines, mapped = _columns(path, called, signals, columns or {})
     except OSError as reason:
         raise InvalidInput(
             f"Log {called}: expected a file that can be read, found: {reason.strerror}; check its name."
         ) from reason
     states, remarks = _completed(states, signals)
+    remarks += tuple(in_other_units(mapped, _units(signals)))
     return Log(
         called, signals, t, states, commands[:-1] if len(commands) == len(t) else commands, lines, remarks
     )
+
+
+def _units(signals: Signals) -> dict[str, str]:
+    """The unit of each column."""
+    of_states = {state.name: state.unit for state in signals.states}
+    return {TIME: "s"} | of_states | {command.name: command.unit for command in signals.commands}
 
 
 def _completed(readings: Floats, signals: Signals) -> tuple[Floats, tuple[Remark, ...]]:
@@ -260,16 +271,17 @@ def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
     return found
 
 
-def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats, Floats, Sequence[int]]:
-    """Times, states and commands, and the line of each row."""
+def _columns(
+    path: Path, called: str, signals: Signals, columns: Mapping[str, str]
+) -> tuple[Floats, Floats, Floats, Sequence[int], Mapping[str, str]]:
+    """Times, states and commands, the line of each row, and what signals are called there that have another name."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as reason:
         raise InvalidInput(
             f"Log {called}: expected text in UTF-8, found other bytes; save it as CSV."
         ) from reason
-    head = text.partition("\n")[0]
-    delimiter = max(DELIMITERS, key=head.count)
+    delimiter = max(DELIMITERS, key=text.partition("\n")[0].count)
     try:
         # Not `splitlines`, which ends a row at any form feed or vertical tab in a note.
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
@@ -278,7 +290,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         raise InvalidInput(
             f"Log {called}: expected columns of numbers, found: {reason}; save it as CSV."
         ) from reason
-    names = [name.strip() for name in rows[0][1]] if rows else []
+    head = [name.strip() for name in rows[0][1]] if rows else []
+    names = renamed(head, columns, (TIME, *signals.state_names, *signals.command_names), called)
     states_read = [state.name for state in logged(signals, names)]
     rates = [state.name for state in signals.states if not state.measured and state.name in names]
     if rates and len(states_read) < signals.n_x:
@@ -296,13 +309,12 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         )
     missing = [name for name in wanted if name not in names]
     if missing:
-        units = {TIME: "s"} | {state.name: state.unit for state in signals.states}
-        units |= {command.name: command.unit for command in signals.commands}
+        units = _units(signals)
         unused = [name for name in names if name and name not in wanted]
         meant = advice({name: units[name] for name in missing}, unused)
         raise InvalidInput(
-            f"Log {called}: expected columns called {', '.join(wanted)}, found {listed(names)}; {', '.join(missing)}"
-            f" {'is' if len(missing) == 1 else 'are'} missing: {meant}"
+            f"Log {called}: expected columns called {', '.join(wanted)}, found {listed(head)}; {', '.join(missing)}"
+            f" {'is' if len(missing) == 1 else 'are'} missing: {meant}{ELSEWHERE}"
         )
     body = rows[1:]
     _refuse_longer(body, len(names), called)
@@ -318,7 +330,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
 
     n = len(body)
     t, states = np.array(column(TIME, n)), matrix(states_read, n)
-    return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body]
+    called_there = {name: column for name, column in columns.items() if column in head and name in wanted}
+    return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body], called_there
 
 
 def _refuse_longer(body: Sequence[tuple[int, Sequence[str]]], columns: int, called: str) -> None:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import SequenceMatcher
+
+from twinloop.errors import InvalidInput, unknown
+from twinloop.remarks import Remark, note
 
 ALIKE = 0.75
 """Similarity from which a name is taken for a mistyped other one: "torqe" for "torque", but not "t" for "tz"."""
@@ -23,6 +26,53 @@ def listed(names: Sequence[str]) -> str:
         names: of all.
     """
     return ", ".join([*names[:SHOWN], *(["…"] if len(names) > SHOWN else [])]) or "none"
+
+
+def renamed(head: Sequence[str], columns: Mapping[str, str], wanted: Sequence[str], called: str) -> list[str]:
+    """The header of a log with the names that signals have.
+
+    Args:
+        head: names of its columns.
+        columns: of some that are wanted, what they are called in logs. One that this log does not have is left: the
+            log may have been written with the signals' own names.
+        wanted: the signals' own names.
+        called: what messages call the log.
+
+    Returns:
+        A name for each column; an empty one where its own name is that of a signal which another column has.
+
+    Raises:
+        InvalidInput: of something that is no signal, no name, or one for two signals.
+    """
+    own: dict[str, str] = {}
+    for name, column in columns.items():
+        if name not in wanted:
+            raise unknown(f"signal in the columns of the log {called}", name, wanted)
+        if not isinstance(column, str) or column in own:
+            raise InvalidInput(
+                f"Log {called}, columns: expected a column of its own for {name!r}, found {column!r}"
+                + (f" for {own[column]!r}, too." if isinstance(column, str) else ".")
+            )
+        own[column] = name
+    found = {column: name for column, name in own.items() if column in head}
+    return [found.get(column, "" if column in found.values() else column) for column in head]
+
+
+def in_other_units(columns: Mapping[str, str], units: Mapping[str, str]) -> Iterator[Remark]:
+    """Columns whose header has another unit in brackets than the signal that they are read as.
+
+    Args:
+        columns: what some signals are called in a log.
+        units: of the signals, by name.
+    """
+    for name, column in columns.items():
+        bare = UNIT.fullmatch(column)
+        if bare and bare[2].strip() not in (units[name], ""):
+            yield note(
+                "unit",
+                f"The column {column!r} is read as {name}, which is in {units[name]}: convert it if it is in another"
+                " unit.",
+            )
 
 
 def advice(missing: Mapping[str, str], unused: Sequence[str]) -> str:

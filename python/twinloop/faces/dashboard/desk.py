@@ -11,7 +11,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
-from twinloop.faces.opening import check_beside
+from twinloop.faces.opening import check_beside, fields_beside
 from twinloop.faces.telling import (
     against_it,
     attach,
@@ -165,7 +165,9 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            asked, read = tell(campaign, number, log, aborted=aborted, name=called)
+            asked, read = tell(
+                campaign, number, log, aborted=aborted, name=called, columns=fields_beside(self.store)
+            )
             flight = [run for run in campaign.experiments if run.number == asked.number][-1]
             said = f"Test {number} recorded: {len(campaign.experiments)} experiments are stored."
             return "\n".join([said, *_against(campaign, flight, asked, read)])
@@ -183,7 +185,7 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            read = attach(campaign, log, name=called)
+            read = attach(campaign, log, name=called, columns=fields_beside(self.store))
             said = f"Attached: {len(campaign.experiments)} experiments are stored."
             return "\n".join([said, *_against(campaign, campaign.experiments[-1], None, read)])
 
