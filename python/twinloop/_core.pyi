@@ -273,7 +273,8 @@ class Model:
         """One a command; none at all where every command acts at once and nothing is hidden."""
     @property
     def hidden(self) -> list[_Hidden]:
-        """States that commands fill, then those that states fill; inputs of the program after the commands."""
+        """States that commands fill, then those that are integrated with the states; inputs of the program after the
+        commands."""
     @property
     def constants(self) -> _Floats:
         """Of the effective program, in its order."""

@@ -29,6 +29,10 @@ GAP = [((), False, 0.25, 0.4, (1,), False, 0.12, 0.01, 0.05)] * 2
 """What presses on a mass behind a gap, and its rate."""
 
 
+SERVO = [((0, 1), False, 0.25, 0.4, (), False, 0.11, 0.0, 0.0)] * 2
+"""Two that turn into each other while commands drive them."""
+
+
 def pressed(twist, rate, gap=0.01, damping=0.05):
     """A spring and a damper that never pull, softened where they just touch."""
     deep = abs(twist) - gap
@@ -81,6 +85,48 @@ def test_two_that_turn_into_each_other_are_a_mass_on_a_spring():
     text = twin.equations(3)
     assert "d hidden_1 / dt = (rate/8) - 0.25 - hidden_1/0.4 - hidden_2/0.11" in text
     assert "d hidden_2 / dt = (rate/8) - 0.25 - hidden_2/0.4 + hidden_1/0.11" in text
+
+
+@pytest.mark.parametrize("lags", [(0.0, 0.0), (0.07, 0.0)])
+def test_two_that_commands_drive_are_a_servo_that_swings(lags):
+    actuators = [(lag, 1, 0.0, 0.0) for lag in lags]
+    twin = twin_of(LINEAR, inputs=6, actuators=actuators, hidden=SERVO)
+    fades, turns = np.array([[2.5, 0.0], [0.0, 2.5]]), np.array([[0.0, 1.0], [-1.0, 0.0]]) / 0.11
+
+    def slope(u):
+        def of(t, y):
+            torque, fan = (y[4 + i] if lag else u[i] for i, lag in enumerate(lags))
+            acceleration = -3.0 * y[0] - 0.4 * y[1] + 5.0 * torque / 2.0 + 2.0 * y[2] - 14.0 * y[3]
+            filled = 0.5 * (torque / 2.0 + fan / 5.0) - 0.25 - (fades + turns) @ y[2:4]
+            lagging = [(u[i] - y[4 + i]) / lag if lag else 0.0 for i, lag in enumerate(lags)]
+            return [y[1], acceleration, *filled, *lagging]
+
+        return of
+
+    found = twin.simulate_commands([0.3, 2.0], COMMANDS).true_states
+    y, arrived = np.array([0.3, 2.0, 0.0, 0.0, 0.0, 0.0]), np.vstack([np.zeros(2), COMMANDS])
+    for state, u in zip(found[1:], arrived, strict=False):
+        y = solve_ivp(slope(u), (0.0, SIGNALS.dt), y, rtol=1e-10, atol=1e-12).y[:, -1]
+        np.testing.assert_allclose(state, y[:2], atol=3e-4)
+    text = twin.equations(3)
+    assert "d hidden_1 / dt = torque_scaled/2 + fan_scaled/2 - 0.25 - hidden_1/0.4 - hidden_2/0.11" in text
+    assert "d hidden_2 / dt = torque_scaled/2 + fan_scaled/2 - 0.25 - hidden_2/0.4 + hidden_1/0.11" in text
+    assert "from 0 at the start" in text
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.07])
+def test_a_servo_is_linearised_where_it_settles(lag):
+    twin = twin_of(LINEAR, inputs=6, actuators=[(lag, 0, None, 0.0), (0.0, 0, None, 0.0)], hidden=SERVO)
+    plant = twin.linearise([0.2, -1.0], [0.5, 1.0])
+    first = 2 + (lag > 0.0)
+    pair = slice(first, first + 2)
+    fades = np.array([[2.5, 1.0 / 0.11], [-1.0 / 0.11, 2.5]])
+    np.testing.assert_allclose(plant.A[pair, pair], -fades)
+    np.testing.assert_allclose(plant.state[pair], np.linalg.solve(fades, [0.5 * (0.25 + 0.2) - 0.25] * 2))
+    np.testing.assert_allclose(plant.drift[pair], 0.0, atol=1e-15)
+    # Of the torque's scale of 2, and of the fan's of 5, the mean of both.
+    np.testing.assert_allclose(plant.A[pair, 2] if lag else plant.B[pair, 0], 0.25)
+    np.testing.assert_allclose(plant.B[pair, 1], 0.1)
 
 
 def test_a_mass_behind_a_gap_is_pressed_on_either_side_and_moves_along_at_the_start():
@@ -189,6 +235,8 @@ def test_a_record_with_what_is_no_gap_is_refused(wrong):
 def test_a_gap_needs_a_law_that_is_integrated_finely(form):
     with pytest.raises(tl.InvalidInput, match="gap"):
         linear_twin(form, hidden=GAP)
+    with pytest.raises(tl.InvalidInput, match="turn while commands fill them"):
+        linear_twin(form, hidden=SERVO)
 
 
 def test_a_record_with_one_that_turns_into_nothing_is_refused():
@@ -207,9 +255,16 @@ def test_a_record_with_one_that_turns_into_nothing_is_refused():
             Actuation.from_record(alone)
 
 
-@pytest.mark.parametrize("hidden", [STORED, SWINGING])
 @pytest.mark.parametrize(
-    "form", ["acceleration", "explicit-euler", "semi-implicit-euler", "increment", "absolute"]
+    ("form", "hidden"),
+    [
+        *(
+            (form, hidden)
+            for form in ("acceleration", "explicit-euler", "semi-implicit-euler", "increment", "absolute")
+            for hidden in (STORED, SWINGING)
+        ),
+        ("acceleration", SERVO),
+    ],
 )
 def test_of_a_linear_law_the_linearisation_flies_as_the_law_does(form, hidden):
     twin = linear_twin(form, hidden)
@@ -217,8 +272,10 @@ def test_of_a_linear_law_the_linearisation_flies_as_the_law_does(form, hidden):
     plant = twin.linearise(at, COMMANDS[0], discrete=True)
     assert plant.states[2:4] == ("hidden_1", "hidden_2")
     flown = twin.simulate_commands(at, COMMANDS).true_states
-    x = plant.state.copy()
-    begun = x.copy()
+    begun = plant.state.copy()
+    x = begun.copy()
+    if hidden is SERVO:
+        x[2:4] = 0.0  # a run begins with it at rest; it is linearised where it settles
     for state, u in zip(flown[1:], COMMANDS, strict=True):
         x = begun + plant.A @ (x - begun) + plant.B @ (u - COMMANDS[0]) + plant.drift
         np.testing.assert_allclose(x[:2], state, rtol=1e-9, atol=1e-9)
@@ -272,7 +329,7 @@ def test_a_law_and_a_record_give_it_back_to_the_bit():
 
 
 @pytest.mark.parametrize("kind", ["python", "c", "fmu3", "casadi", "control"])
-@pytest.mark.parametrize("which", ["stored", "swinging", "behind a gap", "turning"])
+@pytest.mark.parametrize("which", ["stored", "swinging", "servo", "behind a gap", "turning"])
 def test_an_export_has_it_as_states(which, kind, tmp_path):
     """What is written is compared with the twin's own free runs before it is handed out."""
     needed = {"casadi": "casadi", "control": "control", "fmu3": "fmpy"}
@@ -281,6 +338,7 @@ def test_an_export_has_it_as_states(which, kind, tmp_path):
     made = {
         "stored": stored_twin,
         "swinging": lambda: linear_twin(hidden=SWINGING),
+        "servo": lambda: linear_twin(hidden=SERVO),
         "behind a gap": lambda: linear_twin(hidden=GAP),
         "turning": turning_twin,
     }

@@ -1,6 +1,6 @@
 //! Actuation: what stands between commands and a model. Each command has an actuator with a delay and a first-order
 //! lag, and may move at a limited rate: de/dt = clip((u − e) / lag, ± rate). Hidden states that commands fill may follow,
-//! and after these some that states fill.
+//! and after these some that are integrated with the states.
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden, Play};
@@ -49,7 +49,7 @@ impl Actuator {
 pub struct Actuation {
     /// One a command, or none at all where every command acts at once and nothing is hidden.
     pub actuators: Vec<Actuator>,
-    /// States that commands fill, then those that other states fill.
+    /// States that commands fill, then those that are integrated with the states.
     pub hidden: Vec<Hidden>,
 }
 
@@ -69,7 +69,9 @@ impl Actuation {
             .map(|hidden| hidden.validated(commands, states))
             .collect::<Result<_>>()?;
         if !hidden.is_sorted_by_key(Hidden::moves) {
-            return invalid("hidden states: expected those that commands fill before those that states fill");
+            return invalid(
+                "hidden states: expected those that commands fill before those that are integrated",
+            );
         }
         let turning: Vec<usize> = (0..hidden.len()).filter(|&i| hidden[i].turns().is_some()).collect();
         let paired = |pair: &[usize]| matches!(pair, &[i, j] if j == i + 1 && hidden[i] == hidden[j]);
@@ -164,16 +166,9 @@ impl<V: Vector> Line<V> {
         let hidden: Vec<_> =
             (commands..).zip(hidden).map_while(|(i, one)| Filling::new(one, decays[i], gains[i])).collect();
         let effects = || zeros(commands + hidden.len());
-        let first = times.len() - actuation.ramping().count() * V::LANES;
-        let mut limited: Vec<_> = (0..commands).map(|_| None).collect();
-        for (i, ramp) in actuation.ramping().zip(times[first..].chunks_exact(V::LANES)) {
-            let rates = ramp.iter().map(|ramp| 1.0 / (factors[i] * ramp)).collect();
-            let lags = times[i * V::LANES..][..V::LANES].to_vec();
-            limited[i] = Some(Limited { lags, rates, time: 0.5 * dt });
-        }
         Self {
             memory: zeros(commands),
-            limited,
+            limited: Limited::those_of(actuation, factors, dt, times, V::LANES),
             effects: [effects(), effects(), effects()],
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
             hidden,
@@ -237,6 +232,25 @@ struct Limited {
 }
 
 impl Limited {
+    /// Of each command, if its effect moves at a limited rate.
+    #[inline(never)]
+    fn those_of(
+        actuation: &Actuation,
+        factors: &[f64],
+        dt: f64,
+        times: &[f64],
+        lanes: usize,
+    ) -> Vec<Option<Self>> {
+        let first = times.len() - actuation.ramping().count() * lanes;
+        let mut limited: Vec<_> = actuation.actuators.iter().map(|_| None).collect();
+        for (i, ramp) in actuation.ramping().zip(times[first..].chunks_exact(lanes)) {
+            let rates = ramp.iter().map(|ramp| 1.0 / (factors[i] * ramp)).collect();
+            let lags = times[i * lanes..][..lanes].to_vec();
+            limited[i] = Some(Self { lags, rates, time: 0.5 * dt });
+        }
+        limited
+    }
+
     /// The effect after the time under a command, and after as much again.
     #[inline(never)]
     fn halfway_and_through<V: Vector>(&self, from: V, to: V) -> [V; 2] {
@@ -273,6 +287,7 @@ fn moved(from: f64, to: f64, lag: f64, rate: f64, time: f64) -> f64 {
 }
 
 /// For each time constant: the decay over half a period, e^(−dt / 2 time) or 0 for a time of 0, and the gain of its input.
+#[inline(never)]
 fn fading(times: &[f64], dt: f64) -> (Vec<f64>, Vec<f64>) {
     let decay = |&time: &f64| if time > 0.0 { libm::exp(-0.5 * dt / time) } else { 0.0 };
     times.iter().map(|time| (decay(time), time * (1.0 - decay(time)))).unzip()

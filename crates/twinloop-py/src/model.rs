@@ -223,11 +223,13 @@ fn filled(
         (false, true, _) if !settled && turns.is_none() && play.is_none() => {
             Source::Commands { commands, rest }
         }
-        (true, false, Some(rest)) => Source::States { states, rest, settled, turns, play },
+        (false, true, Some(rest)) | (true, false, Some(rest)) => {
+            Source::States { states, commands, rest, settled, turns, play }
+        }
         _ => {
             return Err(misuse(format!(
-                "hidden state: expected commands, or states with a rest, that fill it, and only with states that it is \
-                 settled or turns, found commands {commands:?}, states {states:?}, rest {rest:?}"
+                "hidden state: expected commands, or states with a rest, that fill it, and only with these that it is \
+                 settled, found commands {commands:?}, states {states:?}, rest {rest:?}"
             )));
         }
     };
@@ -241,9 +243,9 @@ fn parts(hidden: &Hidden) -> HiddenParts {
         Source::Commands { commands, rest } => {
             (commands, *squared, rest, *time, vec![], false, 0.0, 0.0, 0.0)
         }
-        Source::States { states, rest, settled, turns, play } => {
+        Source::States { states, commands, rest, settled, turns, play } => {
             let (half, damping) = play.map_or((0.0, 0.0), |play| (play.half, play.damping));
-            (vec![], *squared, Some(rest), *time, states, settled, turns.unwrap_or(0.0), half, damping)
+            (commands, *squared, Some(rest), *time, states, settled, turns.unwrap_or(0.0), half, damping)
         }
     }
 }

@@ -111,11 +111,12 @@ def price(
     behind = [[actuation.actuators[i] for i in group] for group in alike]
     lagging = sum(any(one.lag > 0.0 or one.delay > 0 for one in group) for group in behind)
     lagging += sum(any(one.ramp > 0.0 for one in group) for group in behind)
+    by_motion = any(one.states for one in actuation.hidden)
     return (
         STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
-        + (STANDING_IN + SLIGHT * readings) * (tuned and bool(actuation.hidden) and not actuation.stored)
+        + (STANDING_IN + SLIGHT * readings) * (tuned and bool(actuation.hidden) and not by_motion)
         + bool(actuation.stored) * STORING * len(actuation.hidden)
         + PLAYING * sum(one.gap > 0.0 for one in actuation.stored)
         + len(actuation.stored) * 2.0 * float(log(2.0 * states * (1 + len(alike))))

@@ -70,7 +70,8 @@ class IdentificationOptions:
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.
         hidden: whether a hidden state is searched that commands drive and that decays, such as a climb or heat.
-        storage: whether hidden states are searched that measured states drive, such as the twist of a joint.
+        storage: whether hidden states are searched that measured states drive, such as the twist of a joint, or that
+            swing while commands drive them, such as a servo.
         offsets: whether sensors may be late or early against those of the driven states, and these late
             against one another.
         reports: whether sensors may be slow, and declared derivatives computed of readings.

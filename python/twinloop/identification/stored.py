@@ -17,10 +17,10 @@ from twinloop.signals import Signals
 def stored(
     hidden: HiddenState, stages: Sequence[Floats], runs: Sequence[slice], signals: Signals
 ) -> tuple[Floats, Floats, Floats]:
-    """A hidden state that states fill, within each period: one Runge-Kutta step of order four, as the law takes it.
+    """A hidden state that is integrated with the states, in each period by one Runge-Kutta step, as the law takes it.
 
     Args:
-        hidden: that states fill; of two that turn into each other, or are beside a gap, the first one.
+        hidden: such a one; of two that turn into each other, or are beside a gap, the first one.
         stages: inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one.
         runs: rows of each run.
         signals: of the system.
@@ -29,7 +29,8 @@ def stored(
         Its values at the start, the middle and the end of each period (rows, 1); with its partner's, if it has one
         (rows, 2).
     """
-    scales = np.array([signals.states[place].scale for place in hidden.states])
+    drivers = hidden.drivers(signals)
+    scales = np.array(list(drivers.values()))
     dt, rest = signals.dt, hidden.rest or 0.0
     # Two that turn into each other are one complex number z: z' = (1 + i) filling - (1 / time - i / turns) z.
     turning = hidden.turns > 0.0 and not hidden.gap
@@ -37,7 +38,7 @@ def stored(
     time = 1.0 / fades if turning else hidden.time
 
     def filling(inputs: Floats) -> Any:
-        given = inputs[:, list(hidden.states)] / scales
+        given = inputs[:, list(drivers)] / scales
         over = (given * given if hidden.squared else given).mean(axis=1) - rest
         return over * (1.0 + 1.0j) if turning else over
 

@@ -66,13 +66,14 @@ class HiddenState(NamedTuple):
     the start it moves along, in the middle of the gap.
 
     Args:
-        commands: places of those that drive it; none where states do.
+        commands: places of those that drive it; none where states do. What they drive alone is exact, for they are held
+            over a period; two that turn are integrated with the states.
         squared: whether its sources drive it with their squares.
-        rest: level that does not drive it; None, of commands alone: that of the first period.
+        rest: level that does not drive it; None, of commands that drive it alone: that of the first period.
         time: after which 1/e of it is left, s.
         states: places of the states that drive it; none where commands do.
         settled: whether a run begins with it in steady state; only where states drive it.
-        turns: time in which it and its partner turn by one radian, s; 0 where it has none; only where states drive it.
+        turns: time in which it and its partner turn by one radian, s; 0 where it has none.
         gap: half of the gap between it and its partner, in units of the level times s; 0 where there is none.
         damping: of what presses beyond the gap, over its stiffness, s; 0 where there is no gap.
     """
@@ -86,6 +87,20 @@ class HiddenState(NamedTuple):
     turns: float = 0.0
     gap: float = 0.0
     damping: float = 0.0
+
+    @property
+    def integrated(self) -> bool:
+        """Whether it is integrated with the states: where they drive it, or it turns into its partner."""
+        return bool(self.states) or self.turns > 0.0
+
+    def drivers(self, signals: Signals) -> dict[int, float]:
+        """Places of what drives it, among the inputs of a law, each with the scale that it is in units of.
+
+        Args:
+            signals: of the system. Effects of commands are in units of theirs already.
+        """
+        by_states = {place: signals.states[place].scale for place in self.states}
+        return {**by_states, **{signals.n_x + place: 1.0 for place in self.commands}}
 
 
 def renewed_hidden(items: object) -> object:
@@ -117,7 +132,7 @@ class Actuation(Recorded, kind="actuation"):
 
     Args:
         actuators: one a command.
-        hidden: states that commands drive, then those that other states drive.
+        hidden: states that commands drive, then those that are integrated with the states.
     """
 
     actuators: tuple[Actuator, ...]
@@ -144,13 +159,13 @@ class Actuation(Recorded, kind="actuation"):
     def effects(self, signals: Signals, commands: Floats) -> list[Floats]:
         """What arrives of commands (n, n_u), then hidden states that they fill, within each period."""
         scales = np.array([command.size for command in signals.commands])
-        filled = [state for state in self.hidden if not state.states]
+        filled = [state for state in self.hidden if not state.integrated]
         return _core.command_effects(self.actuators, filled, scales, signals.dt, commands)
 
     @property
     def stored(self) -> tuple[HiddenState, ...]:
-        """Hidden states that states fill."""
-        return tuple(state for state in self.hidden if state.states)
+        """Hidden states that are integrated with the states."""
+        return tuple(state for state in self.hidden if state.integrated)
 
     @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Actuation:
@@ -291,8 +306,8 @@ def _check_hidden(state: HiddenState, where: str) -> None:
             f"{where}: expected a gap and a damping between two that turn into each other, neither squared nor settled,"
             " or neither of them, found others."
         )
-    driven = bool(state.commands) != bool(state.states) and (state.turns == 0.0 or bool(state.states))
-    if not driven or (state.commands and state.settled) or (state.states and state.rest is None):
+    driven = bool(state.commands) != bool(state.states) and not (state.gap and state.commands)
+    if not driven or (state.commands and state.settled) or (state.integrated and state.rest is None):
         raise InvalidInput(
             f"{where}: expected commands that drive it and that it is not settled, or states and a rest, found others."
         )

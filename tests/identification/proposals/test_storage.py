@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import twinloop as tl
 from sameness import same, through_json
@@ -131,13 +132,72 @@ def test_a_load_behind_a_spring_is_a_pair_that_turns():
     runs = [coupled(seed) for seed in range(2)]
     blind, found = (learnt(runs, JOINT, storage=storage) for storage in (False, True))
     first, second = found.actuation.hidden
-    assert first == second and first.states
-    # The motor held, the load swings at the root of 96 rad²/s², and fades with 0.2 of its speed a second.
-    poles = np.roots([1.0, 0.4, 96.0])
+    assert first == second and bool(first.states) != bool(first.commands)
+    # The motor held, the load swings at the root of 96 rad²/s², and fades with 0.2 of its speed a second. As the torque
+    # drives it, motor and load swing freely: their poles, but for that of both together.
+    free = np.linalg.eigvals(
+        [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-48.0, 48.0, -0.7, 0.2], [96.0, -96.0, 0.4, -0.4]]
+    )
+    poles = np.roots([1.0, 0.4, 96.0]) if first.states else free[np.abs(free.imag) > 1.0]
     assert 1.0 / first.turns == pytest.approx(abs(poles[0].imag), rel=0.02)
     assert 1.0 / first.time == pytest.approx(-poles[0].real, rel=0.1)
     without, within = (missed(each, JOINT, coupled) for each in (blind, found))
     assert within < 2e-3 and within < 0.02 * without
+
+
+SPEED, SHARE = 30.0, 0.5
+"""Of the servo, rad/s, and of its critical damping."""
+
+
+def finned(seed, noise=1.0):
+    """A fin behind a servo of second order, which is not logged, turns a body that a keel brings back."""
+    stream = np.random.default_rng([seed, 5])
+    commands = held(stream, 200, -0.8, 0.8, 8)
+
+    def slope(x, u):
+        turned = SPEED * SPEED * (u[0] - x[2]) - 2.0 * SHARE * SPEED * x[3]
+        return np.array([x[1], 60.0 * x[2] - 4.0 * x[1] - 9.0 * x[0], x[3], turned])
+
+    states = integrated(slope, [0.0] * 4, commands, JOINT.dt, steps=20)[:, :2]
+    return Run.of(states + noise * np.array([5e-4, 5e-3]) * stream.normal(size=states.shape), commands)
+
+
+def sprung(seed, noise=1.0):
+    """A link on a spring whose other end a motor turns, of which no sensor reads anything."""
+    stream = np.random.default_rng([seed, 6])
+    commands = held(stream, 250, -0.8, 0.8, 10)
+
+    def slope(x, u):
+        twist = 40.0 * (x[0] - x[2]) + 0.1 * (x[1] - x[3])
+        return np.array([x[1], (-twist - 0.1 * x[1]) / 0.1, x[3], (twist + 4.0 * u[0] - 0.2 * x[3]) / 0.05])
+
+    states = integrated(slope, [0.0] * 4, commands, JOINT.dt, steps=40)[:, :2]
+    return Run.of(states + noise * np.array([5e-4, 5e-3]) * stream.normal(size=states.shape), commands)
+
+
+def test_a_servo_that_no_sensor_reads_is_a_pair_that_its_command_drives():
+    runs = [finned(seed) for seed in range(2)]
+    blind, found = (learnt(runs, JOINT, storage=storage) for storage in (False, True))
+    first, second = found.actuation.hidden
+    assert first == second and first.commands == (0,) and not first.states
+    assert 1.0 / first.turns == pytest.approx(SPEED * np.sqrt(1.0 - SHARE * SHARE), rel=0.05)
+    assert 1.0 / first.time == pytest.approx(SHARE * SPEED, rel=0.05)
+    without, within = (missed(each, JOINT, finned) for each in (blind, found))
+    assert within < 2e-3 and within < 0.1 * without
+    # One of the two alone is nothing that a later search could begin with.
+    options = options_of("default", QUICK)
+    later = identify_runs([*runs, finned(2)], JOINT, options, earlier=found, iteration=1, workers=WORKERS)
+    assert later.actuation.hidden and all(
+        one.commands == (0,) and one.turns for one in later.actuation.hidden
+    )
+
+
+def test_a_motor_at_the_other_end_of_a_spring_is_found_by_its_link_alone():
+    runs = [sprung(seed) for seed in range(2)]
+    blind, found = (learnt(runs, JOINT, storage=storage) for storage in (False, True))
+    assert any(one.commands and one.turns for one in found.actuation.stored)
+    without, within = (missed(each, JOINT, sprung) for each in (blind, found))
+    assert within < 0.1 * without
 
 
 def back_emf(seed, noise=1.0):
@@ -283,6 +343,27 @@ def test_regressions_see_what_a_pair_that_turns_does():
     exact = solve_ivp(slope, (0.0, times[-1]), begun, t_eval=times, rtol=1e-10, atol=1e-12).y.T
     np.testing.assert_allclose(seen.start[:, 3:], exact[:-1], atol=2e-5)
     np.testing.assert_allclose(seen.end[:, 3:], exact[1:], atol=2e-5)
+
+
+def test_regressions_see_what_a_servo_does():
+    one = HiddenState((0,), False, 0.25, 0.1, turns=0.04)
+    stream = np.random.default_rng(0)
+    commands = held(stream, 60, -1.0, 1.0, 5)
+    run = Run.of(np.zeros((61, 2)), commands)
+    seen = stages([run], JOINT, Actuation((Actuator(),), (one, one)))
+    rates, h = np.array([[10.0, 25.0], [-25.0, 10.0]]), np.zeros(2)
+    for k, u in enumerate(commands):
+        np.testing.assert_allclose(seen.start[k, 3:], h, atol=1e-4)
+        # Held over a period the command fills it exactly.
+        rest = np.linalg.solve(rates, [u[0] - 0.25] * 2)
+        h = rest + expm(-rates * JOINT.dt) @ (h - rest)
+        np.testing.assert_allclose(seen.end[k, 3:], h, atol=1e-4)
+
+
+@pytest.mark.parametrize(("time", "shown"), [(0.039, False), (0.041, True)])
+def test_a_servo_may_be_damped_well(time, shown):
+    assert shows([HiddenState((0,), False, 0.0, time, turns=0.08)] * 2, 0.02) is shown
+    assert not shows([HiddenState((), False, 0.0, time, (0,), turns=0.08)] * 2, 0.02)
 
 
 def test_a_hypothesis_with_storage_comes_back_from_its_record():

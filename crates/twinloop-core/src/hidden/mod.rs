@@ -32,13 +32,15 @@ pub enum Source {
         /// The mean at which it neither fills nor empties; none: that of the first period.
         rest: Option<f64>,
     },
-    /// Some of the states.
+    /// Some of the states, or, of two that turn into each other, some of the commands.
     ///
     /// Two neighbours may turn into each other, as the place and the speed of a mass on a spring do: then −h₂ / turns is
     /// added to the first one's slope, and h₁ / turns to the second one's.
     States {
-        /// Which, by number.
+        /// Which, by number; none where commands fill it.
         states: Vec<usize>,
+        /// Commands that fill it, by number; none where states do.
+        commands: Vec<usize>,
         /// The mean at which it neither fills nor empties.
         rest: f64,
         /// Whether a run begins with it settled at what fills it then, and not empty.
@@ -85,12 +87,17 @@ impl Hidden {
             Source::Commands { commands: filling, rest } => {
                 some_of(filling, commands) && rest.is_none_or(f64::is_finite)
             }
-            Source::States { states: filling, rest, turns, play, settled } => {
+            Source::States { states: filling, commands: swinging, rest, turns, play, settled } => {
                 let played = |Play { half, damping }: Play| {
                     positive(half) && positive(damping) && turns.is_some() && !settled && !self.squared
                 };
-                some_of(filling, states)
-                    && rest.is_finite()
+                let by_commands =
+                    some_of(swinging, commands) && turns.is_some() && play.is_none() && !settled;
+                (if filling.is_empty() {
+                    by_commands
+                } else {
+                    swinging.is_empty() && some_of(filling, states)
+                }) && rest.is_finite()
                     && turns.is_none_or(positive)
                     && play.is_none_or(played)
             }
@@ -104,7 +111,7 @@ impl Hidden {
         ))
     }
 
-    /// Whether states fill it.
+    /// Whether it is integrated with the states: where they fill it, or it turns.
     pub(crate) fn moves(&self) -> bool {
         matches!(self.source, Source::States { .. })
     }
@@ -115,6 +122,11 @@ impl Hidden {
             Source::Commands { .. } => None,
             Source::States { turns, .. } => turns,
         }
+    }
+
+    /// Whether it is known within a period only in steps of Runge and Kutta: where it jumps, or commands do.
+    pub(crate) fn is_fine(&self) -> bool {
+        matches!(&self.source, Source::States { commands, play, .. } if play.is_some() || !commands.is_empty())
     }
 
     /// The gap between it and its partner; none where there is none.
@@ -155,12 +167,17 @@ mod tests {
     }
 
     fn of_states(states: Vec<usize>, rest: f64, turns: Option<f64>) -> Hidden {
-        of(Source::States { states, rest, settled: true, turns, play: None })
+        of(Source::States { states, commands: vec![], rest, settled: true, turns, play: None })
+    }
+
+    fn turning(commands: Vec<usize>, states: Vec<usize>, settled: bool, turns: Option<f64>) -> Hidden {
+        of(Source::States { states, commands, rest: 0.25, settled, turns, play: None })
     }
 
     fn behind_a_gap(half: f64, damping: f64, turns: Option<f64>) -> Hidden {
         let play = Some(Play { half, damping });
-        let source = Source::States { states: vec![1], rest: 0.0, settled: false, turns, play };
+        let source =
+            Source::States { states: vec![1], commands: vec![], rest: 0.0, settled: false, turns, play };
         Hidden { source, squared: false, time: 0.3 }
     }
 
@@ -172,6 +189,7 @@ mod tests {
             of_states(vec![0, 1], 0.25, None),
             of_states(vec![1], 0.25, Some(0.04)),
             behind_a_gap(0.01, 0.002, Some(0.04)),
+            turning(vec![0], vec![], false, Some(0.04)),
         ] {
             assert_eq!(right.clone().validated(1, 2), Ok(right));
         }
@@ -188,6 +206,10 @@ mod tests {
             of_states(vec![1], f64::INFINITY, None),
             of_states(vec![1], 0.25, Some(0.0)),
             of_states(vec![1], 0.25, Some(f64::NAN)),
+            turning(vec![0], vec![], false, None),
+            turning(vec![0], vec![], true, Some(0.04)),
+            turning(vec![1], vec![], false, Some(0.04)),
+            turning(vec![0], vec![1], false, Some(0.04)),
             behind_a_gap(0.0, 0.002, Some(0.04)),
             behind_a_gap(0.01, f64::NAN, Some(0.04)),
             behind_a_gap(0.01, 0.002, None),

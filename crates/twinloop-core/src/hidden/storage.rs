@@ -1,9 +1,9 @@
-//! What states fill, in the course of a run: integrated with the states, point after point.
+//! What is integrated with the states in the course of a run, point after point: what they fill, and what turns.
 
 use super::{Hidden, Play, Source};
 use crate::lanes::{Vector, numbers, vectors};
 
-/// The hidden states of a model that its own states fill, with what a program sees of commands and of them.
+/// The hidden states of a model that are integrated with its own, with what a program sees of commands and of them.
 #[derive(Clone)]
 pub(crate) struct Storage<V> {
     stored: Stored,
@@ -11,7 +11,7 @@ pub(crate) struct Storage<V> {
 }
 
 impl<V: Vector> Storage<V> {
-    /// At the start of a run, of those among some hidden states that states fill, if there are any; the times of all, then
+    /// At the start of a run, of those among some hidden states that are integrated, if there are any; the times of all, then
     /// those in which they turn, then their gaps, are given lane by lane, and steps of the integrator in s, `staged` if they
     /// are of Runge and Kutta.
     #[inline(never)]
@@ -30,7 +30,7 @@ impl<V: Vector> Storage<V> {
     #[inline(never)]
     pub fn see(&mut self, state: &[V], effects: &[V]) -> &[V] {
         let mut seen = numbers(effects);
-        seen.extend(self.stored.see(&numbers(state)));
+        seen.extend(self.stored.see(&numbers(state), &numbers(effects)));
         self.seen = vectors(&seen);
         &self.seen
     }
@@ -40,27 +40,35 @@ impl<V: Vector> Storage<V> {
 #[derive(Clone)]
 struct Inflow {
     states: Vec<usize>,
+    commands: Vec<usize>,
     squared: bool,
     rest: f64,
     settled: bool,
 }
 
 impl Inflow {
-    /// Of a hidden state that states fill.
+    /// Of a hidden state that is integrated.
     fn of(hidden: &Hidden) -> Option<Self> {
         match &hidden.source {
             Source::Commands { .. } => None,
-            Source::States { states, rest, settled, .. } => {
-                Some(Self { states: states.clone(), squared: hidden.squared, rest: *rest, settled: *settled })
-            }
+            Source::States { states, commands, rest, settled, .. } => Some(Self {
+                states: states.clone(),
+                commands: commands.clone(),
+                squared: hidden.squared,
+                rest: *rest,
+                settled: *settled,
+            }),
         }
     }
 
-    /// What flows in on one lane of several, beyond its rest.
-    fn at(&self, states: &[f64], factors: &[f64], lanes: usize, lane: usize) -> f64 {
-        let given = self.states.iter().map(|&i| states[i * lanes + lane] * factors[i]);
+    /// What flows in on one lane of several, beyond its rest. Factors are those of the states, then those of commands.
+    fn at(&self, states: &[f64], effects: &[f64], factors: &[f64], lanes: usize, lane: usize) -> f64 {
+        let of_states = self.states.iter().map(|&i| states[i * lanes + lane] * factors[i]);
+        let given = of_states.chain(
+            self.commands.iter().map(|&j| effects[j * lanes + lane] * factors[states.len() / lanes + j]),
+        );
         let sum: f64 = given.map(|given| if self.squared { given * given } else { given }).sum();
-        sum * (1.0 / self.states.len() as f64) - self.rest
+        sum * (1.0 / (self.states.len() + self.commands.len()) as f64) - self.rest
     }
 }
 
@@ -82,7 +90,7 @@ struct Partner {
 #[derive(Clone)]
 struct Stored {
     inflows: Vec<Inflow>,
-    /// One over the scale of each state.
+    /// One over the scale of each state, then of each command.
     factors: Vec<f64>,
     lanes: usize,
     /// Step of the integrator, s, and whether it is one of Runge and Kutta; else one by the rule of trapezoids.
@@ -100,7 +108,7 @@ struct Stored {
 }
 
 impl Stored {
-    /// At the start of a run, of those among some hidden states that states fill, whose times are given lane by lane.
+    /// At the start of a run, of those among some hidden states that are integrated, whose times are given lane by lane.
     fn new(
         hidden: &[Hidden],
         factors: &[f64],
@@ -128,9 +136,9 @@ impl Stored {
         })
     }
 
-    /// The numbers at the integrator's next point, at which the states are these.
-    fn see(&mut self, state: &[f64]) -> Vec<f64> {
-        let inflow = self.inflow(state);
+    /// The numbers at the integrator's next point, at which these are the states and the effects of commands.
+    fn see(&mut self, state: &[f64], effects: &[f64]) -> Vec<f64> {
+        let inflow = self.inflow(state, effects);
         if self.stage.is_none() {
             self.settle(&inflow);
         }
@@ -158,9 +166,9 @@ impl Stored {
     }
 
     /// What flows into each number.
-    fn inflow(&self, state: &[f64]) -> Vec<f64> {
+    fn inflow(&self, state: &[f64], effects: &[f64]) -> Vec<f64> {
         let lanes = self.lanes;
-        let of = |i: usize| self.inflows[i / lanes].at(state, &self.factors, lanes, i % lanes);
+        let of = |i: usize| self.inflows[i / lanes].at(state, effects, &self.factors, lanes, i % lanes);
         (0..self.now.len()).map(of).collect()
     }
 
@@ -270,7 +278,14 @@ mod tests {
 
     fn filled_by_the_second(squared: bool, settled: bool, turns: Option<f64>) -> Hidden {
         Hidden {
-            source: Source::States { states: vec![1], rest: 0.25, settled, turns, play: None },
+            source: Source::States {
+                states: vec![1],
+                commands: vec![],
+                rest: 0.25,
+                settled,
+                turns,
+                play: None,
+            },
             squared,
             time: 0.3,
         }
@@ -372,6 +387,7 @@ mod tests {
     fn a_mass_behind_a_gap_moves_as_its_equations_say() {
         let (time, turns, play) = (0.5, 0.02, Play { half: 0.003, damping: 0.004 });
         let source = Source::States {
+            commands: vec![],
             states: vec![1],
             rest: 0.0,
             settled: false,
@@ -422,6 +438,52 @@ mod tests {
             }
         }
         assert!((250..1450).contains(&pressed), "{pressed}");
+    }
+
+    #[test]
+    fn a_pair_that_a_command_fills_turns_and_fades_as_its_equations_say() {
+        let (time, turns) = (0.5, 0.04);
+        let one = Hidden {
+            source: Source::States {
+                states: vec![],
+                commands: vec![1],
+                rest: 0.25,
+                settled: false,
+                turns: Some(turns),
+                play: None,
+            },
+            squared: false,
+            time,
+        };
+        let times = [time, time, time, time, turns, turns, turns, turns];
+        // Scales of two states, then of two commands.
+        let factors = [1.0, 0.25, 1.0, 0.5];
+        let step = 0.1 * DT;
+        let mut storage =
+            Storage::<Wide<f64, 2>>::new(&[one.clone(), one], &factors, &times, step, true).unwrap();
+        let effects = [Wide::splat(-1.0), Wide::splat(2.5)];
+        // z = h1 + i h2 of z' = (1 + i) f - (1 / time - i / turns) z begins at 0: z = (1 + i) f (1 - exp(-a t)) / a.
+        let (fades, turned, filled) = (1.0 / time, -1.0 / turns, 2.5 * 0.5 - 0.25);
+        for k in 0..100 {
+            let t = f64::from(k) * step;
+            let seen: Vec<_> = (0..4)
+                .map(|_| storage.see(&[Wide::splat(7.0), Wide::splat(4.0)], &effects).to_vec())
+                .collect();
+            let (size, angle) = ((-fades * t).exp(), -turned * t);
+            let gone = [1.0 - size * angle.cos(), -size * angle.sin()];
+            let above = [filled * (gone[0] - gone[1]), filled * (gone[0] + gone[1])];
+            let square = fades * fades + turned * turned;
+            let expected = [
+                (above[0] * fades + above[1] * turned) / square,
+                (above[1] * fades - above[0] * turned) / square,
+            ];
+            for lane in 0..2 {
+                let found = [seen[0][2].lane(lane), seen[0][3].lane(lane)];
+                for i in 0..2 {
+                    assert!((found[i] - expected[i]).abs() < 1e-6, "{found:?} is not {expected:?} at {t}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::form::Form;
 use crate::actuators::Actuation;
 use crate::difference::Periods;
 use crate::error::{Result, invalid};
+use crate::hidden::Hidden;
 use crate::levels::Levels;
 use crate::sensors::Sensors;
 use crate::signals::{RigidBody, Signals};
@@ -119,9 +120,10 @@ impl Frame {
     /// The same with something between commands and model, an actuator for each command.
     pub fn with_actuation(self, actuation: Actuation) -> Result<Self> {
         let actuation = actuation.validated(self.commands, self.slopes.len())?;
-        if self.form != Form::Acceleration && actuation.hidden.iter().any(|hidden| hidden.play().is_some()) {
+        if self.form != Form::Acceleration && actuation.hidden.iter().any(Hidden::is_fine) {
             return invalid(
-                "hidden states: expected a gap only in a law of derivatives that are integrated finely",
+                "hidden states: expected a gap, and two that turn while commands fill them, only in a law of derivatives \
+                 that are integrated finely",
             );
         }
         let mut factors = self.factors;

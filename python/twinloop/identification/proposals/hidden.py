@@ -99,7 +99,7 @@ def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:
 def _known(context: Context, hypothesis: Hypothesis) -> tuple[HiddenState, ...]:
     """Hidden states that commands fill and that were found before."""
     earlier = () if context.earlier is None else context.earlier.actuation.hidden
-    return tuple(state for state in hypothesis.actuation.hidden or earlier if state.commands)
+    return tuple(state for state in hypothesis.actuation.hidden or earlier if not state.integrated)
 
 
 def _unit(context: Context, hypothesis: Hypothesis) -> Unit:

@@ -1,4 +1,4 @@
-"""Hidden states that motion fills: the twist of a joint, the heat of a wall, the pressure behind a piston.
+"""Hidden states that motion fills: the twist of a joint, the heat of a wall, the pressure behind a piston; and servos.
 
 Looked for where a model leaves more than noise. One state fills such a storage or, beside it and with the same time, a
 group of commands or another state does: all that a first-order storage holds of them is a sum of the two. Which one
@@ -42,7 +42,11 @@ FEWEST_PERIODS = 5.0
 FADING = (3.0, 20.0)
 """Times in which such a pair fades, in those in which it turns by one radian."""
 SWINGING = 4.0
-"""Times in which a pair turns by one radian that it lasts at least."""
+"""Times in which a pair turns by one radian that it lasts at least, where a state drives it."""
+SERVO_FADING = (0.8, 2.0, 5.0, 20.0)
+"""As `FADING`, where commands drive such a pair: a servo may be damped so well that it hardly swings."""
+SERVO = 0.5
+"""As `SWINGING`, where commands drive it: they are known, and nothing that disturbs foretells them."""
 FINER_SWINGS = (1.4, 1.15, 1.05)
 """Factors between frequencies, and between times, where a pair has shown."""
 FINER = (2.0, 1.25)
@@ -133,13 +137,16 @@ def shows(hidden: Sequence[HiddenState], period: float) -> bool:
         hidden: states, with their tuned times.
         period: of the readings, s.
     """
-    return all(one.time >= max(period, SWINGING * one.turns) for one in hidden if one.states)
+    by_states = any(one.states for one in hidden)
+    least = SWINGING if by_states else SERVO
+    return all(one.time >= max(period, least * one.turns) for one in hidden if one.integrated)
 
 
 def filled_by_motion(screen: Screen, brief: bool = False) -> Iterator[Hypothesis]:
     """The hypothesis of a screen, not fitted, with the best storage of each kind; none that does not pay at all.
 
-    Kinds are what one state fills, empty or settled at the start, what two fill, and pairs that turn into each other.
+    Kinds are what one state fills, empty or settled at the start, what two fill, and pairs that turn into each other,
+    which a state drives, or commands, such as a servo.
 
     Args:
         screen: of a hypothesis with sums to begin with, and without such states.
@@ -167,6 +174,14 @@ def filled_by_motion(screen: Screen, brief: bool = False) -> Iterator[Hypothesis
         for pair in _swinging(place, begins, longest, context.signals.dt)
     )
     kinds.append((swings, [] if brief else swings(swinging), FINER_SWINGS))
+    if not brief and screen.hypothesis.form == "acceleration":
+        driven = screen.beside(FURTHER)
+        commanded = driven(
+            pair
+            for group in alike_commands(context.signals)
+            for pair in _commanded(group, longest, context.signals.dt)
+        )
+        kinds.append((driven, commanded, FINER_SWINGS))
     showing = [
         (of_kind, found, factors)
         for of_kind, found, factors in (
@@ -268,9 +283,9 @@ class Screen:
         unit = context.unit.part(hypothesis.start + STORED + FURTHER * number)
         return Screen(context, bare, terms, inputs, problem, unit, itertools.count(1))
 
-    def beside(self) -> Screen:
-        """The same with a unit of work of its own."""
-        return replace(self, unit=self.unit.part(0), numbers=itertools.count(1))
+    def beside(self, number: int = 0) -> Screen:
+        """The same with a unit of work of its own, of a number that is 0 or above those of searches."""
+        return replace(self, unit=self.unit.part(number), numbers=itertools.count(1))
 
     @cached_property
     def without(self) -> Hypothesis:
@@ -293,8 +308,8 @@ class Screen:
         """The hypothesis behind hidden states, and its problem."""
         bare = self.hypothesis
         tried = replace(bare, actuation=replace(bare.actuation, hidden=sources))
-        by_states = all(source.states for source in sources)
-        inputs = self.inputs.storing(sources, self.context.signals) if by_states else None
+        integrated = all(source.integrated for source in sources)
+        inputs = self.inputs.storing(sources, self.context.signals) if integrated else None
         return tried, Problem(self.context, tried, inputs, self.problem)
 
     def _searched(self, several: Sequence[tuple[Hypothesis, Problem]]) -> list[Hypothesis]:
@@ -361,12 +376,25 @@ def _pairs(context: Context, alone: Hypothesis, others: Sequence[int], time: flo
 
 def _swinging(place: int, settled: bool, longest: float, period: float) -> Iterator[Sources]:
     """Pairs that turn into each other while one state drives them, at rest or in steady state at the start."""
-    slowest, fastest = longest / (2.0 * np.pi), FEWEST_PERIODS * period / (2.0 * np.pi)
-    for number in range(SWINGS):
-        turns = slowest * float(power(fastest / slowest, number / (SWINGS - 1)))
+    for turns in _turns(longest, period):
         for fading in FADING:
             one = HiddenState((), False, 0.0, fading * turns, (place,), settled, turns)
             yield one, one
+
+
+def _commanded(group: Sequence[int], longest: float, period: float) -> Iterator[Sources]:
+    """Pairs that turn into each other while some commands drive them, at rest at the start."""
+    for turns in _turns(longest, period):
+        for fading in SERVO_FADING:
+            one = HiddenState(tuple(group), False, 0.0, fading * turns, turns=turns)
+            yield one, one
+
+
+def _turns(longest: float, period: float) -> Iterator[float]:
+    """Times in which pairs turn by a radian that are tried."""
+    slowest, fastest = longest / (2.0 * np.pi), FEWEST_PERIODS * period / (2.0 * np.pi)
+    for number in range(SWINGS):
+        yield slowest * float(power(fastest / slowest, number / (SWINGS - 1)))
 
 
 def _sources(context: Context) -> list[int]:

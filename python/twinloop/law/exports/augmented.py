@@ -77,16 +77,20 @@ def _held(name: str, one: HiddenState, second: bool) -> State:
     return State(name, "s", min(one.time, one.turns or one.time))
 
 
-def _level(expressions: Expressions, signals: Signals, one: HiddenState) -> int:
-    """The node of what fills a stored hidden state, beyond its rest."""
+def _level(expressions: Expressions, signals: Signals, one: HiddenState, count: int) -> int:
+    """The node of what fills one of so many stored hidden states, beyond its rest."""
     make, constant = expressions.add, expressions.constant
     total: int | None = None
-    for source in one.states:
-        given = make("*", expressions.input(source), constant(1.0 / signals.states[source].scale))
+    drivers = one.drivers(signals)
+    for source, scale in drivers.items():
+        # Commands come after the states, and are in units of their scales.
+        of_state = source < signals.n_x
+        given = expressions.input(source if of_state else source + count)
+        given = make("*", given, constant(1.0 / scale)) if of_state else given
         given = make("*", given, given) if one.squared else given
         total = given if total is None else make("+", total, given)
     assert total is not None
-    level = make("*", total, constant(1.0 / len(one.states))) if len(one.states) > 1 else total
+    level = make("*", total, constant(1.0 / len(drivers))) if len(drivers) > 1 else total
     return make("-", level, constant(one.rest)) if one.rest else level
 
 
@@ -100,11 +104,11 @@ def _slope(expressions: Expressions, signals: Signals, stored: Sequence[HiddenSt
 
     faded = make("/", itself(place), constant(one.time))
     if place in twists(stored):
-        return make("-", _level(expressions, signals, one), itself(partner))
+        return make("-", _level(expressions, signals, one, len(stored)), itself(partner))
     if one.gap:
         pressed = _press(expressions, signals, stored, partner)
         return make("-", make("/", pressed, constant(one.turns * one.turns)), faded)
-    slope = make("-", _level(expressions, signals, one), faded)
+    slope = make("-", _level(expressions, signals, one, len(stored)), faded)
     if partner == place:
         return slope
     turned = make("/", itself(partner), constant(one.turns))

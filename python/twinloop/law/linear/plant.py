@@ -33,7 +33,7 @@ SETTLED = 1e-6
 def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Linear:
     """A law around a point, by exact derivatives; with actuators at rest under the command.
 
-    Hidden states that commands fill are at 0 there, those that states fill where they settle.
+    Hidden states that commands fill by themselves are at 0 there, those that are integrated where they settle.
 
     Args:
         law: of a twin.
@@ -49,7 +49,7 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
     """
     plain = _period(law, state, command) if discrete else _instant(law, state, command)
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
-    point = np.concatenate([state, factors * command, settled_as_seen(law, state)])
+    point = np.concatenate([state, factors * command, settled_as_seen(law, state, factors * command)])
     found = as_given(law.reports, as_read(law, plain, _wrapped(law, point)), law.signals.dt)
     if not _finite(found):
         raise _no_derivatives()
@@ -79,7 +79,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     lagging = [i for i, actuator in enumerate(law.actuation.actuators) if actuator.lag > 0.0]
     size = n_x + len(lagging) + len(hidden)
     factors = 1.0 / np.array([each.size for each in signals.commands])
-    point = np.concatenate([state, factors * command, settled_as_seen(law, state)])
+    point = np.concatenate([state, factors * command, settled_as_seen(law, state, factors * command)])
     values, slopes = jacobian(law.expressions, law.derivatives(), _wrapped(law, point))
     by_effect = slopes[:, n_x : n_x + n_u] * factors
     A, B, drift = np.zeros((size, size)), np.zeros((size, n_u)), np.zeros(size)
@@ -95,15 +95,22 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         A[:n_x, place] = by_effect[:, i]
         A[place, place], B[place, i] = -1.0 / lag, 1.0 / lag
     stored = len(law.actuation.stored)
-    kept, every = size - stored, np.eye(n_x + stored)
-    of_stored = slopes[:, slopes.shape[1] - stored :]
-    here = Dual(state, every[:n_x]), Dual(settled(law, state)[len(hidden) - stored :], every[n_x:])
+    kept, every = size - stored, np.eye(n_x + stored + n_u)
+    of_stored, given = slopes[:, slopes.shape[1] - stored :], Dual(factors * command, every[n_x + stored :])
+    inputs = Dual.stacked([Dual(state, every[:n_x]), given])
+    held = Dual(settled(law, state, factors * command)[len(hidden) - stored :], every[n_x : n_x + stored])
     A[:n_x, kept:] = 0.0
-    for slope, by in ((of_stored @ seen(law, *here).slopes, A[:n_x]), (moved(law, *here).slopes, A[kept:])):
-        by[:, :n_x] += slope[:, :n_x]
-        by[:, kept:] += slope[:, n_x:]
+    for slope, rows in (
+        (of_stored @ seen(law, inputs, held).slopes, slice(n_x)),
+        (moved(law, inputs, held).slopes, slice(kept, size)),
+    ):
+        A[rows, :n_x] += slope[:, :n_x]
+        A[rows, kept:] += slope[:, n_x : n_x + stored]
+        through = slope[:, n_x + stored :] * factors
+        A[rows, n_x : n_x + len(lagging)] += through[:, lagging]
+        B[rows, direct] += through[:, direct]
     for place, h in enumerate(hidden, start=n_x + len(lagging)):
-        if h.states:
+        if h.integrated:
             continue
         A[place, place] = -1.0 / h.time
         level, slope = _level(h.commands, h.squared, factors * command, factors)
@@ -116,7 +123,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         B,
         (*signals.state_names, *names, *law.held_symbols),
         signals.command_names,
-        np.concatenate([state, command[lagging], settled(law, state)]),
+        np.concatenate([state, command[lagging], settled(law, state, factors * command)]),
         command,
         drift,
         None,
@@ -176,7 +183,8 @@ class _Begun:
 
         x = taken(state)
         held = {i: taken(command[[i]]) for i, actuator in enumerate(actuators) if actuator.lag > 0.0}
-        hidden = taken(settled(law, state))
+        sizes = np.array([each.size for each in signals.commands])
+        hidden = taken(settled(law, state, command / sizes))
         queues = [[taken(command[[i]]) for _ in range(a.delay)] for i, a in enumerate(actuators)]
         return _Begun(names, x, held, hidden, queues, Dual(command, identity[len(names) :]))
 
@@ -235,7 +243,7 @@ def _filled(law: Law, begun: _Begun) -> list[Dual]:
     """Hidden states that commands fill at the start, the middle and the end of a period."""
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
     stages: list[list[Dual]] = [[], [], []]
-    by_commands = [h for h in law.actuation.hidden if h.commands]
+    by_commands = [h for h in law.actuation.hidden if not h.integrated]
     for j, h in enumerate(by_commands):
         kept = float(np.exp(-0.5 * law.signals.dt / h.time))
         level, slope = _level(h.commands, h.squared, factors * begun.sent.values, factors)
@@ -254,13 +262,15 @@ def _stepped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> tuple[D
     Args:
         law: of a twin.
         x: the state at the start of a period.
-        stored: the hidden states that states fill, there.
+        stored: the hidden states that are integrated, there.
         inputs: effects and hidden states that commands fill, at the start, the middle and the end of the period.
     """
     if law.form != "acceleration":
         after = _mapped(law, x, stored, inputs)
         half, fades = 0.5 * law.signals.dt, fading(law)
-        added = (filling(law, x) + filling(law, after) - stored.mapped(fades)) * half
+        n_u = range(law.signals.n_u)
+        ends = [Dual.stacked([at, by.rows(n_u)]) for at, by in ((x, inputs[0]), (after, inputs[2]))]
+        added = (filling(law, ends[0]) + filling(law, ends[1]) - stored.mapped(fades)) * half
         inverse = np.asarray(np.linalg.inv(np.eye(len(fades)) + half * fades), dtype=np.float64)
         return after, (stored + added).mapped(inverse)
     size, n_x = len(x.values) + len(stored.values), len(x.values)
@@ -268,8 +278,9 @@ def _stepped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> tuple[D
 
     def slope(point: Dual, given: Dual) -> Dual:
         states, held = (upright(point) if body else point.rows(range(n_x))), point.rows(range(n_x, size))
-        slopes = [_given(law, roots, states, Dual.stacked([given, seen(law, states, held)]))]
-        slopes.append(moved(law, states, held))
+        inputs = Dual.stacked([states, given.rows(range(law.signals.n_u))])
+        slopes = [_given(law, roots, states, Dual.stacked([given, seen(law, inputs, held)]))]
+        slopes.append(moved(law, inputs, held))
         if body is not None:
             still = Dual(np.zeros(3), np.zeros((3, states.slopes.shape[1])))
             slopes[0] = slopes[0].put(turns, still)
