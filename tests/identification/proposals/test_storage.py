@@ -149,16 +149,18 @@ SPEED, SHARE = 30.0, 0.5
 """Of the servo, rad/s, and of its critical damping."""
 
 
-def finned(seed, noise=1.0):
-    """A fin behind a servo of second order, which is not logged, turns a body that a keel brings back."""
+def finned(seed, noise=1.0, gusts=0.0, share=SHARE):
+    """A fin behind a servo of second order, which is not logged, turns a body that a keel brings back, in gusts."""
     stream = np.random.default_rng([seed, 5])
     commands = held(stream, 200, -0.8, 0.8, 8)
+    blown = gusts * np.random.default_rng([seed, 6]).normal(size=commands.shape)
 
     def slope(x, u):
-        turned = SPEED * SPEED * (u[0] - x[2]) - 2.0 * SHARE * SPEED * x[3]
-        return np.array([x[1], 60.0 * x[2] - 4.0 * x[1] - 9.0 * x[0], x[3], turned])
+        turned = SPEED * SPEED * (u[0] - x[2]) - 2.0 * share * SPEED * x[3]
+        return np.array([x[1], 60.0 * x[2] - 4.0 * x[1] - 9.0 * x[0] + u[1], x[3], turned])
 
-    states = integrated(slope, [0.0] * 4, commands, JOINT.dt, steps=20)[:, :2]
+    given = np.concatenate([commands, blown], axis=1)
+    states = integrated(slope, [0.0] * 4, given, JOINT.dt, steps=20)[:, :2]
     return Run.of(states + noise * np.array([5e-4, 5e-3]) * stream.normal(size=states.shape), commands)
 
 
@@ -190,6 +192,18 @@ def test_a_servo_that_no_sensor_reads_is_a_pair_that_its_command_drives():
     assert later.actuation.hidden and all(
         one.commands == (0,) and one.turns for one in later.actuation.hidden
     )
+
+
+def test_a_servo_that_hardly_swings_is_believed_only_where_it_leaves_nothing_but_noise(monkeypatch):
+    """What states feed back answers for as long; gusts as large hide which of the two it is."""
+
+    def found(gusts):
+        runs = [finned(seed, gusts=gusts, share=0.8) for seed in range(2)]
+        return any(one.commands and one.turns for one in learnt(runs, JOINT).actuation.hidden)
+
+    assert found(0.0) and not found(2.0)
+    monkeypatch.setattr("twinloop.identification.proposals.storage.LEFT", np.inf)
+    assert found(2.0)
 
 
 def test_a_motor_at_the_other_end_of_a_spring_is_found_by_its_link_alone():

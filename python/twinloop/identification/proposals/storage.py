@@ -26,7 +26,7 @@ from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.hidden import filled, with_hidden, without_hidden
-from twinloop.identification.search.noise import first_noise, lasts, still
+from twinloop.identification.search.noise import disturbed, first_noise, lasts, still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search, search_known, usable_among
@@ -47,6 +47,8 @@ SERVO_FADING = (0.8, 2.0, 5.0, 20.0)
 """As `FADING`, where commands drive such a pair: a servo may be damped so well that it hardly swings."""
 SERVO = 0.5
 """As `SWINGING`, where commands drive it: they are known, and nothing that disturbs foretells them."""
+LEFT = 0.25
+"""Share of a sensor's variance that may disturb in a period behind one that fades before it has turned by a radian."""
 FINER_SWINGS = (1.4, 1.15, 1.05)
 """Factors between frequencies, and between times, where a pair has shown."""
 FINER = (2.0, 1.25)
@@ -121,9 +123,22 @@ def _told(context: Context, bare: Hypothesis, numbers: _Numbers, brief: bool = F
             found = replace(found, searches=next(numbers.searches))
             told = fitted(context, from_both_sides(context, found, found.sums))
             # What readings cannot show is no law, but has drawn what nothing else may.
-            if told.fit is not None and not shows(told.actuation.hidden, context.signals.dt):
+            if told.fit is not None and not (
+                shows(told.actuation.hidden, context.signals.dt) and not _stands_in(context, told)
+            ):
                 told = replace(told, fit=replace(told.fit, chi_squared=math.inf))
             yield told
+
+
+def _stands_in(context: Context, told: Hypothesis) -> bool:
+    """Whether a pair that commands drive hardly swings and leaves more than noise: it stands in for what states do.
+
+    A law that states feed back answers to commands for as long as a servo does, but under other gains it answers
+    otherwise. What is left tells the two apart: behind a servo everything is explained. What swings is seen to.
+    """
+    servo = any(one.commands and one.time < one.turns for one in told.actuation.hidden)
+    problem = Problem(context, told)
+    return servo and any(disturbed(problem, found.chain, LEFT) for found in told.sums)
 
 
 def shows(hidden: Sequence[HiddenState], period: float) -> bool:

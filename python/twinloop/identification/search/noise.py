@@ -35,9 +35,14 @@ def calm(problem: Problem, chain: Chain) -> Chain:
         chain: with its noise.
     """
     _, slow = floor_of(chain, problem.dt, problem.integration(chain))
+    return chain.with_noise(chain.sensors, slow) if disturbed(problem, chain, CALM) else chain
+
+
+def disturbed(problem: Problem, chain: Chain, share: float) -> bool:
+    """Whether what disturbs a chain in a period has more than a share of its sensors' variance."""
     period = problem.dt if chain.integrated else 1.0
     moved = chain.motion.white * period + chain.motion.correlated * period * period
-    return chain if moved <= CALM * float(chain.sensors[0]) else chain.with_noise(chain.sensors, slow)
+    return moved > share * float(chain.sensors[0])
 
 
 def lasts(problem: Problem, chain: Chain) -> bool:
