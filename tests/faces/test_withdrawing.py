@@ -66,6 +66,15 @@ def test_a_flight_is_withdrawn_by_its_test_which_then_waits_for_its_log(flights)
     assert look().cost.runs == 1
 
 
+@pytest.mark.parametrize("which", ["0", "attached-1"])
+def test_a_campaign_file_that_cannot_be_read_keeps_no_flight(flights, which):
+    (flights / "rig.toml").write_text("[log\n", encoding="utf-8")
+    said = withdrawn(which)
+    assert said.exit_code == 0, said.output
+    refused = withdrawn("old.csv")
+    assert refused.exit_code == 2 and "rig.toml" in refused.output and "Traceback" not in refused.output
+
+
 @pytest.mark.parametrize("which", ["old.csv", "attached-1"])
 def test_an_attached_flight_is_withdrawn_by_its_log_or_its_place(flights, which):
     facts = json.loads(withdrawn(which, "--json").stdout)

@@ -34,8 +34,8 @@ def check(
 ) -> int:
     """Check a LOG, as CSV, .npz or .ulg, before it is used: clock, gaps, sensors, commands and units.
 
-    FILE.toml has dt, states and commands, as for a campaign; for a .ulg its section [log] names the field of
-    each. Exits with 1 if something has to be corrected first.
+    FILE.toml has dt, states and commands, as for a campaign; its section [log] names the columns that are called
+    otherwise, and for a .ulg the field of each. Exits with 1 if something has to be corrected first.
     """
     if output is not None:
         check_writable(output, [".csv"])

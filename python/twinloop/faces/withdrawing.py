@@ -39,7 +39,9 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
     """
     with closing(Campaign.load(store, name)) as campaign:
         before = campaign.experiments
-        campaign.withdraw(chosen(campaign, which, fields_beside(store)), reason)
+        # A campaign file that cannot be read must not keep a flight that was recorded by mistake.
+        columns = fields_beside(store) if Path(which).is_file() else None
+        campaign.withdraw(chosen(campaign, which, columns), reason)
         test = campaign.withdrawals[-1].test
         others = [run for run in campaign.experiments if test is not None and run.number == test]
         failures = [each for each in campaign.failures if each.test.number == test and not each.recorded]

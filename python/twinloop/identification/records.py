@@ -78,7 +78,7 @@ class Stages:
     integration: Floats
 
     def storing(self, hidden: Sequence[HiddenState], signals: Signals) -> Stages:
-        """The same with hidden states that are integrated with the states behind its inputs."""
+        """The same with hidden states behind its inputs that are integrated with the states."""
         found = self
         for place, one in enumerate(hidden):
             if partners(hidden)[place] < place:

@@ -309,5 +309,6 @@ def _check_hidden(state: HiddenState, where: str) -> None:
     driven = bool(state.commands) != bool(state.states) and not (state.gap and state.commands)
     if not driven or (state.commands and state.settled) or (state.integrated and state.rest is None):
         raise InvalidInput(
-            f"{where}: expected commands that drive it and that it is not settled, or states and a rest, found others."
+            f"{where}: expected commands that drive it and that it is not settled, or states, and a rest where states"
+            " drive it or it turns, found others."
         )

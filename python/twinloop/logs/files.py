@@ -100,10 +100,9 @@ def load(
     A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order, or what
     `columns` says that they are called there; other columns are ignored, states that are not measured may be missing,
     and the commands of the last row may be empty. If the file ends within a row, at a number that may be a part of
-    one, it is refused. A file of NumPy (`.npz`) has
-    arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), whose last row is ignored.
-    Single readings may be missing (an empty cell, or NaN), up to a twentieth of a state's: each is taken half-way
-    between those before and after, and a `RemarkWarning` says how many.
+    one, it is refused. A file of NumPy (`.npz`) has arrays `t` (n + 1,), `states` (n + 1, n_x) and `commands` (n, n_u)
+    or (n + 1, n_u), whose last row is ignored. Single readings may be missing (an empty cell, or NaN), up to a
+    twentieth of a state's: each is taken half-way between those before and after, and a `RemarkWarning` says how many.
 
     A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with its own times. They are resampled to the
     period of the signals: states are interpolated between two samples, and each command is the last one sent. If two
@@ -168,27 +167,18 @@ def read_log(
             raise InvalidInput(
                 f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."
             )
-        mapped: Mapping[str, str] = {}
-        lines: Sequence[int] | None = None
-        if path.suffix.lower() == ".npz":
-            t, states, commands = _arrays(path, called)
-        else:
-            t, states, commands, lines, mapped = _columns(path, called, signals, columns or {})
+        t, states, commands, lines, said = (
+            (*_arrays(path, called), None, ())
+            if path.suffix.lower() == ".npz"
+            else _columns(path, called, signals, columns or {})
+        )
     except OSError as reason:
         raise InvalidInput(
             f"Log {called}: expected a file that can be read, found: {reason.strerror}; check its name."
         ) from reason
     states, remarks = _completed(states, signals)
-    remarks += tuple(in_other_units(mapped, _units(signals)))
-    return Log(
-        called, signals, t, states, commands[:-1] if len(commands) == len(t) else commands, lines, remarks
-    )
-
-
-def _units(signals: Signals) -> dict[str, str]:
-    """The unit of each column."""
-    of_states = {state.name: state.unit for state in signals.states}
-    return {TIME: "s"} | of_states | {command.name: command.unit for command in signals.commands}
+    sent = commands[:-1] if len(commands) == len(t) else commands
+    return Log(called, signals, t, states, sent, lines, (*remarks, *said))
 
 
 def _completed(readings: Floats, signals: Signals) -> tuple[Floats, tuple[Remark, ...]]:
@@ -273,8 +263,8 @@ def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
 
 def _columns(
     path: Path, called: str, signals: Signals, columns: Mapping[str, str]
-) -> tuple[Floats, Floats, Floats, Sequence[int], Mapping[str, str]]:
-    """Times, states and commands, the line of each row, and what signals are called there that have another name."""
+) -> tuple[Floats, Floats, Floats, Sequence[int], Sequence[Remark]]:
+    """Times, states and commands, the line of each row, and what is said of columns of other names."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as reason:
@@ -307,9 +297,10 @@ def _columns(
             f"Log {called}: expected one column called {twice}, found {names.count(twice)}; rename or remove"
             " the others."
         )
+    units = {TIME: "s"} | {state.name: state.unit for state in signals.states}
+    units |= {command.name: command.unit for command in signals.commands}
     missing = [name for name in wanted if name not in names]
     if missing:
-        units = _units(signals)
         unused = [name for name in names if name and name not in wanted]
         meant = advice({name: units[name] for name in missing}, unused)
         raise InvalidInput(
@@ -330,8 +321,9 @@ def _columns(
 
     n = len(body)
     t, states = np.array(column(TIME, n)), matrix(states_read, n)
-    called_there = {name: column for name, column in columns.items() if column in head and name in wanted}
-    return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body], called_there
+    there = {name: column for name, column in columns.items() if column in head and name in wanted}
+    said = list(in_other_units(there, units))
+    return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body], said
 
 
 def _refuse_longer(body: Sequence[tuple[int, Sequence[str]]], columns: int, called: str) -> None:

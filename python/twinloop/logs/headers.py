@@ -51,7 +51,7 @@ def renamed(head: Sequence[str], columns: Mapping[str, str], wanted: Sequence[st
         if not isinstance(column, str) or column in own:
             raise InvalidInput(
                 f"Log {called}, columns: expected a column of its own for {name!r}, found {column!r}"
-                + (f" for {own[column]!r}, too." if isinstance(column, str) else ".")
+                + (f" for {own[column]!r}, too; name another." if isinstance(column, str) else "; name one.")
             )
         own[column] = name
     found = {column: name for column, name in own.items() if column in head}
@@ -66,8 +66,7 @@ def in_other_units(columns: Mapping[str, str], units: Mapping[str, str]) -> Iter
         units: of the signals, by name.
     """
     for name, column in columns.items():
-        bare = UNIT.fullmatch(column)
-        if bare and bare[2].strip() not in (units[name], ""):
+        if _in_another_unit(units[name], column):
             yield note(
                 "unit",
                 f"The column {column!r} is read as {name}, which is in {units[name]}: convert it if it is in another"
@@ -125,6 +124,11 @@ def _written(unit: str) -> set[str]:
 
 
 def _unit(wanted: str, column: str) -> str:
-    """That a column is in another unit, where its header says so."""
+    """The unit that is wanted, in words, where the header of a column has another one."""
+    return f" (which is in {wanted})" if _in_another_unit(wanted, column) else ""
+
+
+def _in_another_unit(wanted: str, column: str) -> bool:
+    """Whether the header of a column has another unit in brackets than the one that is wanted."""
     bare = UNIT.fullmatch(column)
-    return f" (which is in {wanted})" if bare and bare[2].strip() not in (wanted, "") else ""
+    return bare is not None and bare[2].strip() not in (wanted, "")

@@ -91,13 +91,11 @@ impl Hidden {
                 let played = |Play { half, damping }: Play| {
                     positive(half) && positive(damping) && turns.is_some() && !settled && !self.squared
                 };
-                let by_commands =
-                    some_of(swinging, commands) && turns.is_some() && play.is_none() && !settled;
-                (if filling.is_empty() {
-                    by_commands
-                } else {
-                    swinging.is_empty() && some_of(filling, states)
-                }) && rest.is_finite()
+                let by_states = swinging.is_empty() && some_of(filling, states);
+                let by_commands = filling.is_empty() && some_of(swinging, commands);
+                let turning = turns.is_some() && play.is_none() && !settled;
+                (by_states || by_commands && turning)
+                    && rest.is_finite()
                     && turns.is_none_or(positive)
                     && play.is_none_or(played)
             }

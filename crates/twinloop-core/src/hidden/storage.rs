@@ -13,11 +13,11 @@ pub(crate) struct Storage<V> {
 impl<V: Vector> Storage<V> {
     /// At the start of a run, of those among some hidden states that are integrated, if there are any; the times of all, then
     /// those in which they turn, then their gaps, are given lane by lane, and steps of the integrator in s, `staged` if they
-    /// are of Runge and Kutta.
+    /// are of Runge and Kutta. Factors are those of the states, then those of the commands.
     #[inline(never)]
     pub fn new(
         hidden: &[Hidden],
-        factors: &[f64],
+        factors: [&[f64]; 2],
         times: &[f64],
         dt: f64,
         staged: bool,
@@ -30,7 +30,8 @@ impl<V: Vector> Storage<V> {
     #[inline(never)]
     pub fn see(&mut self, state: &[V], effects: &[V]) -> &[V] {
         let mut seen = numbers(effects);
-        seen.extend(self.stored.see(&numbers(state), &numbers(effects)));
+        let stored = self.stored.see(&numbers(state), &seen);
+        seen.extend(stored);
         self.seen = vectors(&seen);
         &self.seen
     }
@@ -111,7 +112,7 @@ impl Stored {
     /// At the start of a run, of those among some hidden states that are integrated, whose times are given lane by lane.
     fn new(
         hidden: &[Hidden],
-        factors: &[f64],
+        factors: [&[f64]; 2],
         times: &[f64],
         lanes: usize,
         dt: f64,
@@ -123,7 +124,7 @@ impl Stored {
         let empty = vec![0.0; times.len()];
         Some(Self {
             inflows: hidden.iter().filter_map(Inflow::of).collect(),
-            factors: factors.to_vec(),
+            factors: factors.concat(),
             lanes,
             dt,
             staged,
@@ -312,7 +313,7 @@ mod tests {
             for (staged, close) in [(true, 2e-5), (false, 2e-3)] {
                 let hidden = filled_by_the_second(squared, settled, None);
                 let mut storage =
-                    Storage::<Wide<f64, 2>>::new(&[hidden], &[1.0, 0.25], &TIMES, DT, staged).unwrap();
+                    Storage::<Wide<f64, 2>>::new(&[hidden], [&[1.0, 0.25], &[]], &TIMES, DT, staged).unwrap();
                 let effects = [Wide::splat(-1.0)];
                 for k in 0..40 {
                     let t = f64::from(k) * DT;
@@ -344,7 +345,8 @@ mod tests {
                 let pair = [one.clone(), one];
                 let times = [time, time, time, time, turns, turns, turns, turns];
                 let mut storage =
-                    Storage::<Wide<f64, 2>>::new(&pair, &[1.0, 0.25], &times, 0.1 * DT, staged).unwrap();
+                    Storage::<Wide<f64, 2>>::new(&pair, [&[1.0, 0.25], &[]], &times, 0.1 * DT, staged)
+                        .unwrap();
                 // The complex number z = h1 + i h2 obeys z' = (1 + i) (0.75 + t) - (1 / time - i / turns) z.
                 let mut z = [0.0, 0.0];
                 let slope = |z: [f64; 2], t: f64| {
@@ -399,7 +401,8 @@ mod tests {
         let times: Vec<f64> = times.iter().flat_map(|&time| [time; 2]).collect();
         let step = 0.02 * DT;
         let mut storage =
-            Storage::<Wide<f64, 2>>::new(&[one.clone(), one], &[1.0, 0.25], &times, step, true).unwrap();
+            Storage::<Wide<f64, 2>>::new(&[one.clone(), one], [&[1.0, 0.25], &[]], &times, step, true)
+                .unwrap();
         let filled = |t: f64| (40.0 * t).cos() - 0.5;
         let mut z = [0.0, filled(0.0)];
         // Springs and dampers that never pull, on either side.
@@ -459,8 +462,14 @@ mod tests {
         // Scales of two states, then of two commands.
         let factors = [1.0, 0.25, 1.0, 0.5];
         let step = 0.1 * DT;
-        let mut storage =
-            Storage::<Wide<f64, 2>>::new(&[one.clone(), one], &factors, &times, step, true).unwrap();
+        let mut storage = Storage::<Wide<f64, 2>>::new(
+            &[one.clone(), one],
+            [&factors[..2], &factors[2..]],
+            &times,
+            step,
+            true,
+        )
+        .unwrap();
         let effects = [Wide::splat(-1.0), Wide::splat(2.5)];
         // z = h1 + i h2 of z' = (1 + i) f - (1 / time - i / turns) z begins at 0: z = (1 + i) f (1 - exp(-a t)) / a.
         let (fades, turned, filled) = (1.0 / time, -1.0 / turns, 2.5 * 0.5 - 0.25);
@@ -490,6 +499,6 @@ mod tests {
     fn what_commands_fill_is_no_storage() {
         let source = Source::Commands { commands: vec![0], rest: None };
         let by_commands = Hidden { source, squared: true, time: 0.3 };
-        assert!(Storage::<Wide<f64, 2>>::new(&[by_commands], &[1.0], &TIMES, DT, true).is_none());
+        assert!(Storage::<Wide<f64, 2>>::new(&[by_commands], [&[1.0], &[]], &TIMES, DT, true).is_none());
     }
 }

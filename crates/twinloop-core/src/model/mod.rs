@@ -171,8 +171,8 @@ impl<'a> Model<'a> {
         let of_hidden = &times[actuation.actuators.len() * V::LANES..];
         let staged = self.frame.form == Form::Acceleration;
         let steps = if staged && self.frame.body.is_some() { self.frame.substeps } else { 1 };
-        let every = [&state_factors[..], factors].concat();
-        (Some(line), Storage::new(&actuation.hidden, &every, of_hidden, dt / steps as f64, staged))
+        let factors = [&state_factors[..], factors];
+        (Some(line), Storage::new(&actuation.hidden, factors, of_hidden, dt / steps as f64, staged))
     }
 
     fn workspace_of<V: Vector>(&self, bank: Bank<V>, times: Option<&[V]>) -> ModelWorkspace<V> {

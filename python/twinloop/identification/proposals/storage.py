@@ -123,9 +123,8 @@ def _told(context: Context, bare: Hypothesis, numbers: _Numbers, brief: bool = F
             found = replace(found, searches=next(numbers.searches))
             told = fitted(context, from_both_sides(context, found, found.sums))
             # What readings cannot show is no law, but has drawn what nothing else may.
-            if told.fit is not None and not (
-                shows(told.actuation.hidden, context.signals.dt) and not _stands_in(context, told)
-            ):
+            shown = shows(told.actuation.hidden, context.signals.dt) and not _stands_in(context, told)
+            if told.fit is not None and not shown:
                 told = replace(told, fit=replace(told.fit, chi_squared=math.inf))
             yield told
 
@@ -134,11 +133,13 @@ def _stands_in(context: Context, told: Hypothesis) -> bool:
     """Whether a pair that commands drive hardly swings and leaves more than noise: it stands in for what states do.
 
     A law that states feed back answers to commands for as long as a servo does, but under other gains it answers
-    otherwise. What is left tells the two apart: behind a servo everything is explained. What swings is seen to.
+    otherwise. What is left tells the two apart: behind a servo everything is explained. What swings
+    shows itself.
     """
-    servo = any(one.commands and one.time < one.turns for one in told.actuation.hidden)
+    if not any(one.commands and one.time < one.turns for one in told.actuation.hidden):
+        return False
     problem = Problem(context, told)
-    return servo and any(disturbed(problem, found.chain, LEFT) for found in told.sums)
+    return any(disturbed(problem, found.chain, LEFT) for found in told.sums)
 
 
 def shows(hidden: Sequence[HiddenState], period: float) -> bool:

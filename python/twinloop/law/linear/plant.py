@@ -48,8 +48,8 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
         NotAvailable: the law has no derivatives there, or, for continuous time, none at all.
     """
     plain = _period(law, state, command) if discrete else _instant(law, state, command)
-    factors = 1.0 / np.array([each.size for each in law.signals.commands])
-    point = np.concatenate([state, factors * command, settled_as_seen(law, state, factors * command)])
+    effects = command * (1.0 / np.array([each.size for each in law.signals.commands]))
+    point = np.concatenate([state, effects, settled_as_seen(law, state, effects)])
     found = as_given(law.reports, as_read(law, plain, _wrapped(law, point)), law.signals.dt)
     if not _finite(found):
         raise _no_derivatives()
@@ -79,7 +79,9 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     lagging = [i for i, actuator in enumerate(law.actuation.actuators) if actuator.lag > 0.0]
     size = n_x + len(lagging) + len(hidden)
     factors = 1.0 / np.array([each.size for each in signals.commands])
-    point = np.concatenate([state, factors * command, settled_as_seen(law, state, factors * command)])
+    effects = factors * command
+    still = settled(law, state, effects)
+    point = np.concatenate([state, effects, settled_as_seen(law, state, effects)])
     values, slopes = jacobian(law.expressions, law.derivatives(), _wrapped(law, point))
     by_effect = slopes[:, n_x : n_x + n_u] * factors
     A, B, drift = np.zeros((size, size)), np.zeros((size, n_u)), np.zeros(size)
@@ -96,9 +98,9 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         A[place, place], B[place, i] = -1.0 / lag, 1.0 / lag
     stored = len(law.actuation.stored)
     kept, every = size - stored, np.eye(n_x + stored + n_u)
-    of_stored, given = slopes[:, slopes.shape[1] - stored :], Dual(factors * command, every[n_x + stored :])
+    of_stored, given = slopes[:, slopes.shape[1] - stored :], Dual(effects, every[n_x + stored :])
     inputs = Dual.stacked([Dual(state, every[:n_x]), given])
-    held = Dual(settled(law, state, factors * command)[len(hidden) - stored :], every[n_x : n_x + stored])
+    held = Dual(still[len(hidden) - stored :], every[n_x : n_x + stored])
     A[:n_x, kept:] = 0.0
     for slope, rows in (
         (of_stored @ seen(law, inputs, held).slopes, slice(n_x)),
@@ -113,7 +115,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         if h.integrated:
             continue
         A[place, place] = -1.0 / h.time
-        level, slope = _level(h.commands, h.squared, factors * command, factors)
+        level, slope = _level(h.commands, h.squared, effects, factors)
         B[place] = slope
         drift[place] = 0.0 if h.rest is None else level - h.rest
     delays = signals.dt * np.array([float(actuator.delay) for actuator in law.actuation.actuators])
@@ -123,7 +125,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         B,
         (*signals.state_names, *names, *law.held_symbols),
         signals.command_names,
-        np.concatenate([state, command[lagging], settled(law, state, factors * command)]),
+        np.concatenate([state, command[lagging], still]),
         command,
         drift,
         None,
