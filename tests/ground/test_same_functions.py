@@ -13,6 +13,7 @@ else:
 
 ROOT = Path(__file__).parents[2]
 BY_BLAS = {"dot", "matmul", "vdot", "inner", "tensordot", "einsum", "linalg", "convolve", "correlate", "cov"}
+COMPLEX = {"complex64", "complex128", "cdouble", "complexfloating"}
 
 
 def decides_nothing():
@@ -53,6 +54,17 @@ def squared_by_the_c_library(source):
     ]
 
 
+def complex_numbers(source):
+    """Lines of a source with complex numbers, whose products NumPy rounds by what the processor can do."""
+    return [
+        node.lineno
+        for node in ast.walk(ast.parse(source))
+        if (isinstance(node, ast.Name) and node.id == "complex")
+        or (isinstance(node, ast.Attribute) and node.attr in COMPLEX)
+        or (isinstance(node, ast.Constant) and isinstance(node.value, complex))
+    ]
+
+
 def is_number(node):
     """Whether it is written as a number, with a sign or without."""
     return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
@@ -63,7 +75,7 @@ def is_whole(number):
     return float(ast.unparse(number)).is_integer()
 
 
-@pytest.mark.parametrize("lines_of", [multiplied_by_blas, squared_by_the_c_library])
+@pytest.mark.parametrize("lines_of", [multiplied_by_blas, squared_by_the_c_library, complex_numbers])
 def test_no_file_that_decides_uses_an_operator_with_other_bits_elsewhere(lines_of):
     excused = set().union(*decides_nothing().values())
     deciding = set((ROOT / "python/twinloop").rglob("*.py")) - excused
@@ -101,3 +113,10 @@ def test_a_product_by_blas_is_seen(source):
 )
 def test_a_power_of_a_fixed_exponent_or_of_a_fraction_is_seen(source, seen):
     assert bool(squared_by_the_c_library(source)) == seen
+
+
+@pytest.mark.parametrize(
+    "source", ["complex(a, b)", "a * 1j", "np.zeros(3, complex)", "a.astype(np.complex128)"]
+)
+def test_a_complex_number_is_seen(source):
+    assert complex_numbers(source) == [1]

@@ -474,5 +474,18 @@ def test_a_hidden_state_has_an_equation_that_sympy_reads():
     )
     text = equations(Law.of(model, SIGNALS))
     assert "d hidden / dt = u_scaled**2/2 + t1**2/2 - 0.25 - hidden/3" in text
-    assert "# x is read 0.004 s later" in text
+    assert "# x is read 0.004 s later" in text and "as sent" not in text
     each_line_is_read_by_sympy(text)
+
+
+@pytest.mark.parametrize(
+    ("late", "words"),
+    [((0,), "it knows u as sent, not as it acts"), ((0, 1), "u, t1 as sent, not as they act")],
+)
+def test_a_hidden_state_that_commands_fill_by_themselves_is_said_to_know_them_as_sent(late, words):
+    program = parsed(5, 1, 6, ["r5 = r4 * 2.0"])
+    hidden = [((0, 1), True, 0.25, 3.0, (), False, 0.0, 0.0, 0.0)]
+    actuators = [(0.2, 3, None, 0.0) if place in late else (0.0, 0, None, 0.0) for place in range(2)]
+    model = _core.Model(program, "acceleration", SIGNALS.engine, actuators, hidden, (0.0, 0.0))
+    text = " ".join(equations(Law.of(model, SIGNALS)).replace("#", " ").split())
+    assert words in text

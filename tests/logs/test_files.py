@@ -1,5 +1,7 @@
 """Logs as CSV: a file that ends within a number is refused, one that ends behind it is read."""
 
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -45,3 +47,33 @@ def test_a_log_that_ends_behind_its_last_reading_is_read_whether_its_command_is_
 def test_a_row_of_all_cells_needs_no_line_end(tmp_path):
     run = loaded(tmp_path, "t,power,temp\n0.0,1500.0,20.5\n10.0,800.5,41.25\n20.0,,49.5")
     np.testing.assert_array_equal(run.states[:, 0], [20.5, 41.25, 49.5])
+
+
+def test_a_line_far_too_long_is_refused_before_it_is_taken_apart(tmp_path):
+    with pytest.raises(tl.InvalidInput, match=r"line 3: expected at most 1000000 characters"):
+        loaded(tmp_path, ROWS.split("\n")[0] + "\n0.0,20.5,1500.0\n" + "1," * 600_000)
+
+
+def test_a_log_is_held_in_numbers_not_in_text(tmp_path):
+    import tracemalloc
+
+    rows = "".join(
+        f"{10.0 * k:.1f},{20.0 + k / 7:.6f},{k % 2000}.25,a note that nobody reads\n" for k in range(20_000)
+    )
+    text = ROWS.split("\n")[0] + ",note\n" + rows
+    path = tmp_path / "flight.csv"
+    path.write_text(text)
+    tracemalloc.start()
+    run = tl.load(path, SIGNALS)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert run.steps == 19_999 and most < 4 * len(text)
+
+
+def test_bytes_in_the_place_of_an_array_are_refused(tmp_path):
+    path = tmp_path / "flight.npz"
+    np.savez(path, t=np.arange(3.0), commands=np.zeros((3, 1)))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("states", "hello")
+    with pytest.raises(tl.InvalidInput, match="expected an array states"):
+        tl.load(path, SIGNALS)

@@ -87,7 +87,21 @@ def test_columns_of_other_names_are_read_where_they_are_named(tmp_path, theirs):
 
 def test_a_log_that_has_the_signals_own_names_needs_no_others(tmp_path):
     own = loaded(tmp_path, NAMES, None)
-    np.testing.assert_array_equal(loaded(tmp_path, NAMES, COLUMNS).states, own.states)
+    with pytest.warns(
+        tl.RemarkWarning, match=r"No column is called 'Time', .*: t, roll, .* are read from the columns"
+    ):
+        there = loaded(tmp_path, NAMES, COLUMNS)
+    np.testing.assert_array_equal(there.states, own.states)
+
+
+def test_a_mistyped_column_is_said_to_be_absent_and_blanks_around_a_name_do_not_count(tmp_path):
+    header = [*NAMES, "IMU roll "]
+    with pytest.warns(
+        tl.RemarkWarning, match="No column is called 'IMU rol': roll is read from the column of that"
+    ):
+        loaded(tmp_path, header, {"roll": "IMU rol"})
+    run = loaded(tmp_path, header, {"roll": " IMU roll "})
+    np.testing.assert_allclose(run.states[:, 0], 1.7 * run.t, atol=1e-6)
 
 
 def test_a_column_that_was_named_comes_before_one_of_the_signals_own_name(tmp_path):
@@ -105,6 +119,7 @@ def test_two_columns_may_be_exchanged_by_their_names(tmp_path):
     [
         ({"rol": "IMU roll"}, "roll"),
         ({"roll": "A", "pitch": "A"}, "expected a column of its own for 'pitch', found 'A' for 'roll', too"),
+        ([("roll", "IMU roll")], "expected a column's name for each signal's"),
         ({"roll": 3}, "expected a column of its own for 'roll', found 3"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 import twinloop as tl
 from conftest import PENDULUM_GAINS
 from oracles import same_bits
+from twinloop.campaign.campaign_file import read_file
 from twinloop.contracts import check_system
 from twinloop.logs import write_columns
 from twinloop.systems.folder import LOOK
@@ -155,3 +156,38 @@ def test_two_logs_of_one_test_are_refused(make, tmp_path, test, pendulum):
         (tmp_path / "drop" / f"flight-0003{suffix}").write_text("")
     with pytest.raises(tl.SystemFailure, match="expected one log"):
         make().run(test)
+
+
+def test_columns_of_other_names_are_read_where_they_are_named(make, tmp_path, test, pendulum):
+    log = tmp_path / "drop" / "flight-0003.csv"
+    with pytest.raises(tl.SystemFailure):
+        make().run(test)
+    write(log, pendulum.run(test))
+    own = make().run(test)
+    log.write_text(log.read_text().replace("angle", "IMU roll", 1))
+    named = make(columns={"angle": "IMU roll"}).run(test)
+    np.testing.assert_array_equal(named.states, own.states)
+
+
+def test_the_columns_that_a_campaign_file_names_are_those_of_the_folders_logs(tmp_path, pendulum):
+    file = tmp_path / "rig.toml"
+    file.write_text(
+        """
+dt = 0.05
+states.angle = { unit = "rad", scale = 3.0 }
+commands.torque = { unit = "N m", bounds = [-1.0, 1.0] }
+controller = { kind = "pid", axes = ["angle"], gains = { "angle.kp" = [0.0, 1.0], "angle.ki" = 0.0, "angle.kd" = 0.0 } }
+task = { initial_state = [0.0], target_state = [1.0], duration = 0.2 }
+first = { "angle.kp" = 0.5 }
+log = { angle = "IMU roll" }
+system = { use = "folder", arguments = { path = "drop", timeout = 1.0, settled = 0.05 } }
+"""
+    )
+    described = read_file(file)
+    system = described.system()
+    test = described.campaign(progress=None).test({"angle.kp": 0.5})
+    with pytest.raises(tl.SystemFailure):
+        system.run(test)
+    rows = "".join(f"{0.05 * k:.2f},{0.1 * k:.1f},0.2\n" for k in range(5))
+    (tmp_path / "drop" / f"flight-{test.number:04d}.csv").write_text("t,IMU roll,torque\n" + rows)
+    np.testing.assert_allclose(system.run(test).states[:, 0], 0.1 * np.arange(5))

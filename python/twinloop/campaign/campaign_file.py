@@ -253,6 +253,10 @@ def read_file(path: str | Path, begun: System | None = None) -> CampaignFile:
     if "autopilot" in found:
         declared(found["autopilot"], f"File {path}")
     flies = system_section(found.get("system"))
+    if flies is not None and flies.use == "folder" and "log" in found:
+        # What writes its logs there calls the columns as it does anywhere.
+        named = {"columns": _section(found, "log", None, ())}
+        flies = dataclasses.replace(flies, arguments={**named, **flies.arguments})
     described = flies is None or "states" in found
     _keys(found, SECTIONS, WHOLE if flies is None else SIGNALS if described else (), str(path))
     signals = made = None

@@ -41,6 +41,17 @@ def status(book: Logbook, test: object) -> str:
     return "abandoned" if number in book.abandoned else "asked"
 
 
+def complete(book: Logbook, test: int) -> list[Experiment]:
+    """Complete runs of a test; those that began elsewhere than the test only where all did.
+
+    Args:
+        book: of the campaign.
+        test: its number.
+    """
+    runs = [run for run in _runs(book, test) if run.quality is not None]
+    return [run for run in runs if not run.off_start] or runs
+
+
 def measured(book: Logbook, test: int) -> float | None:
     """Quality of a test on the system, mean over complete runs; None if there was none.
 
@@ -50,9 +61,7 @@ def measured(book: Logbook, test: int) -> float | None:
         book: of the campaign.
         test: its number.
     """
-    runs = [run for run in _runs(book, test) if run.quality is not None]
-    as_asked = [run for run in runs if not run.off_start]
-    values = [run.quality for run in as_asked or runs if run.quality is not None]
+    values = [run.quality for run in complete(book, test) if run.quality is not None]
     return math.fsum(values) / len(values) if values else None
 
 

@@ -251,6 +251,8 @@ class Equations:
             start += f"; {rest}: the terms before it in the first period"
         else:
             rest = self.writer.number(hidden.rest)
+        if not hidden.integrated and (late := self._not_direct(hidden.commands)):
+            start += f"; it knows {late} as sent, not as {'they act' if ',' in late else 'it acts'}"
         times = [member.actuation.hidden[number].time for member in self.members if self._alike(member)]
         deviation = self._deviation(times)
         note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
@@ -263,6 +265,11 @@ class Equations:
             other = self.law.hidden_symbols[partner]
             terms.append(("-" if partner > number else "+", f"{other}/{self.writer.number(hidden.turns)}"))
         return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
+
+    def _not_direct(self, commands: Sequence[int]) -> str:
+        """Names of commands that act otherwise than they are sent."""
+        late = (place for place in commands if not self.law.actuation.actuators[place].direct)
+        return ", ".join(self.signals.command_names[place] for place in late)
 
     def _behind_a_gap(self, number: int, driven: list[tuple[str, str]], deviation: str) -> list[str]:
         """The equations of a mass behind a gap: what presses on it, or its rate."""

@@ -6,6 +6,7 @@ import csv
 import io
 import warnings
 import zipfile
+from array import array
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -16,19 +17,17 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop._ground.writing import write_whole
 from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
-from twinloop.logs.headers import advice, in_other_units, listed, renamed
+from twinloop.logs.headers import advice, listed, remarks_on, renamed
 from twinloop.logs.missing import filled
+from twinloop.logs.table import TIME, Row, number_in, refuse_cut, refuse_longer, rows_of
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 from twinloop.unmeasured import columns_of, logged, names_of
 
-TIME = "t"
-"""Name of the column of times, s."""
-DELIMITERS = ",;\t"
 WHOLE = Window()
-ELSEWHERE = " What they are called may also be said under [log] of the campaign file."
+ELSEWHERE = " What they are called may also be said by `columns`, or under [log] of the campaign file."
 MOST_BYTES = 200_000_000
 """Of a log, unpacked: an hour of twenty signals at a kilohertz, as text."""
 
@@ -253,6 +252,10 @@ def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
             f"Log {called}: expected a file of NumPy with arrays of numbers, found another one: {reason}."
         ) from reason
     for name, values in zip((TIME, "states", "commands"), found, strict=True):
+        if not isinstance(values, np.ndarray):
+            raise InvalidInput(
+                f"Log {called}: expected an array {name}, found other bytes of that name; write it with numpy.savez."
+            )
         if values.ndim == 0:
             raise InvalidInput(
                 f"Log {called}: expected an array {name} with a row for each reading, found a single value; write all"
@@ -265,22 +268,9 @@ def _columns(
     path: Path, called: str, signals: Signals, columns: Mapping[str, str]
 ) -> tuple[Floats, Floats, Floats, Sequence[int], Sequence[Remark]]:
     """Times, states and commands, the line of each row, and what is said of columns of other names."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as reason:
-        raise InvalidInput(
-            f"Log {called}: expected text in UTF-8, found other bytes; save it as CSV."
-        ) from reason
-    delimiter = max(DELIMITERS, key=text.partition("\n")[0].count)
-    try:
-        # Not `splitlines`, which ends a row at any form feed or vertical tab in a note.
-        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as reason:
-        raise InvalidInput(
-            f"Log {called}: expected columns of numbers, found: {reason}; save it as CSV."
-        ) from reason
-    head = [name.strip() for name in rows[0][1]] if rows else []
+    rows = rows_of(path, called)
+    first = next(rows, None)
+    head = [] if first is None else [name.strip() for name in first.cells]
     names = renamed(head, columns, (TIME, *signals.state_names, *signals.command_names), called)
     states_read = [state.name for state in logged(signals, names)]
     rates = [state.name for state in signals.states if not state.measured and state.name in names]
@@ -307,94 +297,25 @@ def _columns(
             f"Log {called}: expected columns called {', '.join(wanted)}, found {listed(head)}; {', '.join(missing)}"
             f" {'is' if len(missing) == 1 else 'are'} missing: {meant}{ELSEWHERE}"
         )
-    body = rows[1:]
-    _refuse_longer(body, len(names), called)
-    if body and _goes_on(text):
-        _refuse_cut(*body[-1], names, (TIME, *states_read), called)
+    # In numbers from the first row on; the commands of a row are read once there is another one.
+    found = {name: array("d") for name in wanted}
+    places = {name: names.index(name) for name in wanted}
+    lines = array("q")
+    before: Row | None = None
+    for row in rows:
+        refuse_longer(row, len(names), called)
+        refuse_cut(row, names, (TIME, *states_read), called)
+        for name in (TIME, *states_read):
+            found[name].append(number_in(row, places[name], name, called, name in states_read))
+        if before is not None:
+            for name in signals.command_names:
+                found[name].append(number_in(before, places[name], name, called, False))
+        lines.append(row.line)
+        before = row
 
-    def column(name: str, count: int) -> list[float]:
-        place, empty = names.index(name), name in states_read
-        return [_number(row, place, name, line, called, empty) for line, row in body[:count]]
+    def matrix(wanted: Sequence[str], rows: int) -> Floats:
+        return np.array([found[name] for name in wanted], dtype=float).reshape(len(wanted), rows).T
 
-    def matrix(wanted: Sequence[str], count: int) -> Floats:
-        return np.array([column(name, count) for name in wanted]).reshape(len(wanted), -1).T
-
-    n = len(body)
-    t, states = np.array(column(TIME, n)), matrix(states_read, n)
-    there = {name: column for name, column in columns.items() if column in head and name in wanted}
-    said = list(in_other_units(there, units))
-    return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body], said
-
-
-def _refuse_longer(body: Sequence[tuple[int, Sequence[str]]], columns: int, called: str) -> None:
-    """Refuses rows of more cells than there are columns: decimal commas between commas move every number after them."""
-    for line, row in body:
-        if any(cell.strip() for cell in row[columns:]):
-            raise InvalidInput(
-                f"Log {called}, line {line}: expected {columns} cells, one for each column, found {len(row)}; write"
-                " decimals with a point, and one number in a cell."
-            )
-
-
-def _goes_on(text: str) -> bool:
-    """Whether the last line of a text has no end."""
-    return bool(text[max(text.rfind("\n"), text.rfind("\r")) + 1 :].strip())
-
-
-def _refuse_cut(
-    line: int, row: Sequence[str], names: Sequence[str], needed: Sequence[str], called: str
-) -> None:
-    """Refuses a last row that may end within a number that is needed: behind a whole one stands a comma or a line end.
-
-    In a row of all cells nothing tells a cut number from a whole one, and many programs write no last line end.
-    """
-    last = len(row) - 1
-    if last + 1 < len(names) and names[last] in needed and row[last].strip():
-        raise InvalidInput(
-            f"Log {called}, line {line}: expected {len(names)} cells or the end of the line, found that the file"
-            f" ends at {row[last].strip()!r}, which may be a part of {names[last]}; remove this row, or end the line if"
-            " the number is whole."
-        )
-
-
-def _number(row: Sequence[str], place: int, name: str, line: int, called: str, empty: bool) -> float:
-    """The number of a cell; NaN where it is empty, as a historian leaves a reading that it does not have.
-
-    Args:
-        row: its cells.
-        place: of the cell.
-        name: of its column.
-        line: of the row.
-        called: what messages call the log.
-        empty: whether a single cell may be empty.
-    """
-    if place >= len(row):
-        raise InvalidInput(
-            f"Log {called}, line {line}: expected a number for {name}, found a row of {len(row)}"
-            f" cell{'s' * (len(row) > 1)} that ends before it; complete the row, or cut the log before it."
-        )
-    text = row[place].strip()
-    try:
-        return _read(text) if text else np.nan
-    except ValueError as reason:
-        raise InvalidInput(
-            f"Log {called}, line {line}: expected a number for {name}, found {text!r};"
-            f" {_advice(text, name, empty)}."
-        ) from reason
-
-
-def _read(text: str) -> float:
-    """A number as instruments write it: Python would take 1_000 and digits of other scripts as well."""
-    if "_" in text or not text.isascii():
-        raise ValueError(text)
-    return float(text)
-
-
-def _advice(text: str, name: str, empty: bool) -> str:
-    """What to do about a cell that is no number."""
-    whole, comma, rest = text.partition(",")
-    if comma and whole.lstrip("+-").isdigit() and rest.isdigit():
-        return "write decimals with a point"
-    if name == TIME and any(mark in text for mark in ":-/"):
-        return "write times in s from any start, such as that of the first row, not as dates"
-    return "correct it" + (", or leave the cell empty where a single reading is missing" if empty else "")
+    t, states = np.array(found[TIME]), matrix(states_read, len(lines))
+    said = list(remarks_on(columns, head, {name: units[name] for name in wanted}))
+    return t, states, matrix(signals.command_names, max(0, len(lines) - 1)), lines, said

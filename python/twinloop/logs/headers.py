@@ -44,10 +44,16 @@ def renamed(head: Sequence[str], columns: Mapping[str, str], wanted: Sequence[st
     Raises:
         InvalidInput: of something that is no signal, no name, or one for two signals.
     """
+    if not isinstance(columns, Mapping):
+        raise InvalidInput(
+            f"Log {called}, columns: expected a column's name for each signal's, found {columns!r}; write a dict."
+        )
     own: dict[str, str] = {}
     for name, column in columns.items():
         if name not in wanted:
             raise unknown(f"signal in the columns of the log {called}", name, wanted)
+        if isinstance(column, str):
+            column = column.strip()
         if not isinstance(column, str) or column in own:
             raise InvalidInput(
                 f"Log {called}, columns: expected a column of its own for {name!r}, found {column!r}"
@@ -58,15 +64,23 @@ def renamed(head: Sequence[str], columns: Mapping[str, str], wanted: Sequence[st
     return [found.get(column, "" if column in found.values() else column) for column in head]
 
 
-def in_other_units(columns: Mapping[str, str], units: Mapping[str, str]) -> Iterator[Remark]:
-    """Columns whose header has another unit in brackets than the signal that they are read as.
+def remarks_on(columns: Mapping[str, str], head: Sequence[str], units: Mapping[str, str]) -> Iterator[Remark]:
+    """What is said of columns of other names: those that are not there, and those in another unit.
 
     Args:
         columns: what some signals are called in a log.
-        units: of the signals, by name.
+        head: names of its columns.
+        units: of the signals that are read, by name.
     """
+    absent = {name: column for name, column in columns.items() if column.strip() not in head}
+    if own := [name for name in absent if name in units]:
+        yield note(
+            "column",
+            f"No column is called {listed([repr(absent[name]) for name in own])}: {listed(own)}"
+            f" {'is' if len(own) == 1 else 'are'} read from the column{'s' * (len(own) > 1)} of that name.",
+        )
     for name, column in columns.items():
-        if _in_another_unit(units[name], column):
+        if name in units and name not in absent and _in_another_unit(units[name], column):
             yield note(
                 "unit",
                 f"The column {column!r} is read as {name}, which is in {units[name]}: convert it if it is in another"

@@ -265,9 +265,10 @@ class Judge:
         draws: int,
         disturbances: Floats | None,
     ) -> Judged:
-        """Flies candidates under each draw on one of the members, in turn: they all count alike, at the price of one.
+        """Flies candidates under each draw on one of the members, in turn, at the price of one member.
 
         What each draw does is nearly the same on all members, so to fly all draws on all of them tells hardly more.
+        Members count alike where the draws divide among them.
 
         Args:
             members: that judge.

@@ -36,6 +36,7 @@ class Folder(System):
         signals: its states, commands and period.
         timeout: seconds to wait for a log; None: no limit.
         settled: seconds for which a log must not have changed.
+        columns: of a CSV file the columns of `t`, states and commands that have other names there.
         default_gains: a safe first controller, by name.
 
     Raises:
@@ -49,6 +50,7 @@ class Folder(System):
         *,
         timeout: float | None = None,
         settled: float = 2.0,
+        columns: Mapping[str, str] | None = None,
         default_gains: Mapping[str, float] | None = None,
     ) -> None:
         if not isinstance(signals, Signals):
@@ -57,6 +59,7 @@ class Folder(System):
             )
         self.path, self._signals = Path(path), signals
         self.log: Log | None = None
+        self._columns = None if columns is None else dict(columns)
         self.timeout = None if timeout is None else number("Folder, timeout (s)", timeout, above=0.0)
         self.settled = number("Folder, settled (s)", settled, above=0.0)
         if default_gains is not None:
@@ -143,7 +146,7 @@ class Folder(System):
                 reason = " ".join(file.read(LONGEST_REASON).decode("utf-8", "replace").split())
         ended = "aborted" if why.exists() else "completed"
         try:
-            self.log = read_log(log, self._signals)
+            self.log = read_log(log, self._signals, columns=self._columns)
             self.log.warn()
             run = self.log.trajectory(ended, reason or "the rig stopped it")
         except TwinloopError as refusal:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from committees import TUNED, committee_of, planner_of, signals
@@ -11,7 +12,7 @@ from twinloop.campaign.identify_and_plan.disproved import disproved
 from twinloop.planning.gusts import Moved
 
 
-def found_of(monkeypatch, qualities, good, predicted=None, on_task=True, committee=None):
+def found_of(monkeypatch, qualities, good, predicted=None, on_task=True, committee=None, flown=None):
     """Numbers of the tests that are found disproved, all of the same gains."""
     known = signals()
     planner = planner_of(known, draws=8)
@@ -21,7 +22,10 @@ def found_of(monkeypatch, qualities, good, predicted=None, on_task=True, committ
         replace(planner.test(of, *ends_of(planner)), number=number, predicted=told[number])
         for number, of in enumerate(genes)
     ]
+    flights = flown or tests
+    runs = [[SimpleNamespace(test=test)] for test in flights]
     book = SimpleNamespace(flown=dict.fromkeys(range(len(tests))), tests=tests)
+    monkeypatch.setattr(standing, "complete", lambda book, number: runs[number])
     monkeypatch.setattr(standing, "measured", lambda book, number: qualities[number])
     monkeypatch.setattr(standing, "on_task", lambda book, test: on_task)
     found = disproved(planner, committee or committee_of(known), book, good)
@@ -63,3 +67,19 @@ def test_what_noise_and_known_disturbances_explain_disproves_nothing(expected, m
     gusty = replace(committee_of(signals()), gusts=SimpleNamespace(on=lambda test: Moved(0.0, mean)))
     assert found_of(monkeypatch, [2.0 * mean], good=mean, committee=gusty) == []
     assert found_of(monkeypatch, [4.0 * mean], good=mean, committee=gusty) == [0]
+
+
+def test_a_flight_is_held_against_what_was_flown_not_against_what_was_asked(monkeypatch):
+    known = signals()
+    planner, committee = planner_of(known, draws=8), committee_of(known)
+    asked = replace(planner.test(TUNED, *ends_of(planner)), number=0, predicted=1.0)
+    pulses = np.zeros((asked.steps, known.n_u))
+    pulses[: asked.steps // 2] = 0.5 * np.array([command.bounds[1] for command in known.commands])
+    flown = replace(asked, excitation=pulses)
+    judged = planner.judge(committee.members, TUNED[None], committee.sds, 8, pulses[None], measured=True)
+    cost = float(judged.qualities.mean())
+    good = 0.99 * cost / (1.0 + planner.options.worse)
+    # Without the pulses, which somebody has added, it would have been far better.
+    assert found_of(monkeypatch, [cost], good=good) == [0]
+    assert found_of(monkeypatch, [cost], good=good, flown=[flown]) == []
+    assert found_of(monkeypatch, [cost], good=good, flown=[replace(asked, predicted=None)]) == []

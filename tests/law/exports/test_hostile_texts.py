@@ -102,3 +102,30 @@ def test_other_file_names_make_c_that_compiles(name, tmp_path):
     subprocess.run(
         ["cc", "-std=c99", "-Wall", "-Werror", "-fsyntax-only", f"./{source.name}"], cwd=tmp_path, check=True
     )
+
+
+NAMES = [
+    ("u", "w"),
+    ("x", "u"),
+    ("abs", "abs_"),
+    ("out", "SEEN"),
+    ("NAN", "INFINITY"),
+    ("_state", "_seen"),
+    ("min", "max"),
+]
+
+
+@needs_cc
+@pytest.mark.parametrize("names", NAMES, ids="-".join)
+@pytest.mark.parametrize("kind", ["python", "c", "sympy"])
+def test_states_may_be_called_as_an_export_calls_its_own(names, kind):
+    signals = tl.Signals(
+        states=[tl.State(names[0], "m/s", 3.0), tl.State(names[1], "m/s", 8.0)],
+        commands=[tl.Command("thrust", "N", (-2.0, 2.0))],
+        dt=0.05,
+    )
+    lines = [
+        "r3 = abs(r0)", "r4 = max(r1, r2)", "r3 = r3 * -0.5", "r3 = r3 + r4", "r4 = abs(r1)", "r5 = min(r0, r2)",
+        "r4 = r5 - r4",
+    ]  # fmt: skip
+    assert twin_of(lines, signals=signals, inputs=3).export(kind)  # run, and compared

@@ -140,6 +140,17 @@ def test_in_continuous_time_it_is_the_derivative_and_delays_stand_beside():
     np.testing.assert_allclose(discrete.B, both[:2, 2:], atol=1e-4)
 
 
+def test_a_hidden_state_that_commands_fill_knows_them_before_their_delays():
+    model = twin(FILLED, **{**ACTUATED, "actuators": [(0.3, 6, None, 0.0), (0.0, 4, 2.0, 0.0)]})
+    slow, steps = (model.linearise([0.2, -0.1], [0.5, 2.0], discrete=each) for each in (False, True))
+    assert [slow.states[place] for place in slow.at_once] == ["hidden"] and steps.at_once == ()
+    frequencies = np.array([0.2, 0.5, 1.0, 2.0])
+    expected = steps.response(frequencies)[:, :2]
+    # Commands are held for a period, of which half is lost on average.
+    held = np.exp(-0.5j * frequencies * steps.dt)[:, np.newaxis, np.newaxis]
+    np.testing.assert_allclose(slow.response(frequencies)[:, :2] * held, expected, rtol=0.01, atol=1e-4)
+
+
 def test_frequency_responses_are_those_of_python_control():
     found = twin(FILLED, **ACTUATED).linearise([0.2, -0.1], [0.5, 2.0], discrete=True)
     plant = control.ss(found.A, found.B, np.eye(len(found.A)), 0.0, found.dt)

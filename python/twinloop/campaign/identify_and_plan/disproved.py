@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from twinloop._ground.arrays import Floats
@@ -30,23 +33,30 @@ def disproved(planner: Planner, committee: Committee, book: Logbook, good: float
     most = (1.0 + planner.options.worse) * good
     found = []
     for number in sorted(book.flown):
-        test, quality = book.tests[number], standing.measured(book, number)
-        # What nobody has predicted disproves nothing.
-        if (
-            test.predicted is None
-            or quality is None
-            or not quality > most
-            or not standing.on_task(book, test)
-        ):
+        runs = standing.complete(book, number)
+        quality = standing.measured(book, number)
+        # What nobody has predicted, of the flight as it was flown, disproves nothing.
+        flown = [run.test for run in runs if run.test is not None]
+        if quality is None or not quality > most or any(test.predicted is None for test in flown):
             continue
-        predicted, spread = _expected(planner, committee, test)
+        if not all(standing.on_task(book, test) for test in flown):
+            continue
+        predicted, spread = _expected(planner, committee, flown)
         if predicted <= most and quality > predicted + CLEARLY * spread:
-            found.append(test.genes)
+            found.append(flown[0].genes)
     return found
 
 
-def _expected(planner: Planner, committee: Committee, test: Test) -> tuple[float, float]:
-    """Quality that the committee of now expects of a flight that was flown, and its standard deviation."""
+def _expected(planner: Planner, committee: Committee, flown: Sequence[Test]) -> tuple[float, float]:
+    """Mean quality that the committee of now expects of flights as they were flown, and its standard deviation."""
+    each = [_expected_of(planner, committee, test) for test in flown]
+    return (
+        math.fsum(mean for mean, _ in each) / len(each),
+        math.fsum(spread for _, spread in each) / len(each),
+    )
+
+
+def _expected_of(planner: Planner, committee: Committee, test: Test) -> tuple[float, float]:
     excitation = None if test.excitation is None else test.excitation[np.newaxis]
     # One that diverges in a flight that went to its end says nothing of how good it was.
     members = planner.stable_members(committee.members, test.genes[np.newaxis], excitation)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twinloop.law.exports.c_words import number
-from twinloop.law.exports.python_source import joined, stepped_roots
+from twinloop.law.exports.python_source import free_symbols, joined, stepped_roots
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer, decimal, free_prefix
 
@@ -11,7 +11,8 @@ KEYWORDS = frozenset(
     """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while _Bool _Complex
-    _Imaginary sin cos tan exp log pow sqrt fabs tanh real x u y0 y1 j0 j1 yn jn gamma signgam main NULL
+    _Imaginary sin cos tan exp log pow sqrt fabs tanh real x u out SEEN y0 y1 j0 j1 yn jn gamma signgam main NULL NAN
+    INFINITY
     """.split()  # noqa: SIM905
 )
 """Names that a variable in C may not have, or should not."""
@@ -54,7 +55,7 @@ def outputs_c(law: Law, name: str, precision: str) -> str:
         division=f"{name}_divided({{}}, {{}})",
         number=lambda value, digits: decimal(value, digits) + f,
     )
-    symbols = [f"{symbol}_" if symbol in KEYWORDS else symbol for symbol in law.symbols]
+    symbols = free_symbols(law.symbols, KEYWORDS)
     roots = stepped_roots(law)
     writer = Writer(law.expressions, roots, symbols, EXACT, free_prefix(symbols), True, dialect)
     needed = {

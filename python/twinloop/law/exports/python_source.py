@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from twinloop._core import __version__
 from twinloop.law.exports.left_out import left_out
@@ -204,7 +204,12 @@ def python_source(law: Law) -> str:
         *layout(law, actuated=not direct),
     ]
     steps = step_source(law, "_sin, _cos", _ANGLES)
-    parts = ["\n".join(head) + "\n", _HELPERS, outputs_source(law, PYTHON, ("math",)), steps]
+    parts = [
+        "\n".join(head) + "\n",
+        _HELPERS,
+        outputs_source(law, PYTHON, ("math", "abs", "min", "max")),
+        steps,
+    ]
     sensors = sensor_source(law, "_sin, _cos", _ANGLES)
     return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE, sensors])
 
@@ -296,6 +301,22 @@ def joined(terms: Sequence[Term], between: str) -> str:
     return text + "".join(f"{between if size > 80 else ' '}{sign} {term}" for sign, term in rest)
 
 
+def free_symbols(symbols: Sequence[str], taken: Collection[str]) -> list[str]:
+    """Names of variables, those that are taken, or begin as names of the export's own do, with a tail.
+
+    Args:
+        symbols: of a law.
+        taken: names that mean something else.
+    """
+    found: list[str] = []
+    for symbol in symbols:
+        name = f"of{symbol}" if symbol.startswith("_") else symbol
+        while name in taken or name in found or (name != symbol and name in symbols):
+            name += "_"
+        found.append(name)
+    return found
+
+
 def outputs_source(law: Law, dialect: Dialect, taken: Sequence[str]) -> str:
     """What the equations give, as a function of Python.
 
@@ -305,15 +326,15 @@ def outputs_source(law: Law, dialect: Dialect, taken: Sequence[str]) -> str:
         taken: names that these use.
     """
     roots = stepped_roots(law)
-    symbols = [f"{name}_" if name in taken or name.startswith("_") else name for name in law.symbols]
+    symbols = free_symbols(law.symbols, taken)
     writer = Writer(law.expressions, roots, symbols, EXACT, free_prefix(symbols), True, dialect)
     states, seen = symbols[: law.signals.n_x], symbols[law.signals.n_x :]
     lines = [
         "",
-        "def _outputs(x, u):",
-        '    """What the equations give at the state x; u are commands in effect, in units of their scales."""',
-        f"    {', '.join(states)}, = x",
-        f"    {', '.join(seen)}, = u",
+        "def _outputs(_state, _seen):",
+        '    """What the equations give at a state and at commands in effect, in units of their scales."""',
+        f"    {', '.join(states)}, = _state",
+        f"    {', '.join(seen)}, = _seen",
     ]
     lines += [
         f"    {symbol} = _wrapped({symbol}, {state.period!r})"

@@ -132,6 +132,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         delays,
         np.eye(size),
         np.zeros(size),
+        tuple(place for place, h in enumerate(hidden, start=n_x + len(lagging)) if not h.integrated),
     )
 
 

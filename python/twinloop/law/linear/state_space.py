@@ -27,9 +27,11 @@ class Linear:
         command: of the point (n_u,).
         drift: the derivative at the point, or the change over a period (n,); 0 at an equilibrium.
         dt: period, s; None in continuous time.
-        delays: of each command, s, outside A and B (n_u,); 0 in discrete time, where A and B contain them.
+        delays: of each command, s, outside A and B (n_u,); 0 in discrete time, where A and B contain them. They hold
+            for all states but those at `at_once`.
         C: (n, n), from states to readings; the identity in continuous time, or if all sensors are on time.
         offsets: delay of each state's readings, s, outside C (n,); 0 in discrete time.
+        at_once: places of hidden states that commands fill by themselves, in continuous time: as they are sent.
     """
 
     A: Floats
@@ -43,6 +45,7 @@ class Linear:
     delays: Floats
     C: Floats
     offsets: Floats
+    at_once: tuple[int, ...] = ()
 
     def to_control(self) -> Any:
         """The same as a state space of python-control.
@@ -89,5 +92,7 @@ class Linear:
         inner = points[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
         lost = np.exp(-s[:, np.newaxis] * self.delays)
         late = np.exp(-s[:, np.newaxis] * self.offsets)
-        states = np.linalg.solve(inner, self.B.astype(complex)) * lost[:, np.newaxis, :]
+        driven = self.B * lost[:, np.newaxis, :]
+        driven[:, list(self.at_once)] = self.B[list(self.at_once)]
+        states = np.linalg.solve(inner, driven)
         return np.asarray((self.C @ states) * late[:, :, np.newaxis])
