@@ -13,7 +13,7 @@ from twinloop.identification.search.quotients import with_quotients
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
-from twinloop.identification.terms.denominators import denominators
+from twinloop.identification.terms.denominators import Denominator, alone, denominators
 from twinloop.identification.terms.pool import Pool
 
 WORKERS = _core.Workers(1)
@@ -65,10 +65,18 @@ def test_what_may_be_0_is_nothing_to_divide_by():
 def test_a_pole_between_states_is_seen(highest, clear):
     pool = Pool(3)
     bounds = ((0.0, highest), (0.0, highest), (0.0, 1.0))
-    assert vanishes_nowhere(pool, ((pool.product(0, 1), -0.1),), bounds) is clear
-    assert vanishes_nowhere(pool, ((pool.product(0, 0), -0.1),), bounds) is clear
-    assert vanishes_nowhere(pool, ((pool.product(0, 0), 0.1),), bounds)
-    assert vanishes_nowhere(pool, ((pool.product(0, 0), -0.1),), ())
+    assert vanishes_nowhere(pool, Denominator(((pool.product(0, 1), -0.1),)), bounds) is clear
+    assert vanishes_nowhere(pool, Denominator(((pool.product(0, 0), -0.1),)), bounds) is clear
+    assert vanishes_nowhere(pool, Denominator(((pool.product(0, 0), 0.1),)), bounds)
+    assert vanishes_nowhere(pool, Denominator(((pool.product(0, 0), -0.1),)), ())
+
+
+def test_a_room_may_end_where_a_state_alone_vanishes_but_not_go_beyond():
+    pool = Pool(3)
+    for single in alone(pool, 0, 2.0):
+        assert vanishes_nowhere(pool, single, ((0.0, 3.0), (-1.0, 1.0)))
+        assert vanishes_nowhere(pool, single, ((0.5, 3.0), (-1.0, 1.0)))
+    assert not vanishes_nowhere(pool, alone(pool, 1, 2.0)[0], ((0.0, 3.0), (-1.0, 1.0)))
 
 
 @pytest.mark.parametrize(("highest", "found"), [(1.8, True), (4.0, False)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import twinloop as tl
@@ -24,7 +25,7 @@ from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.terms.denominators import denominators, over, quotient
+from twinloop.identification.terms.denominators import Denominator, alone, denominators, over, quotient
 from twinloop.identification.terms.pool import Pool
 
 WORKERS = _core.Workers(1)
@@ -100,7 +101,7 @@ WEIGHTS = st.floats(-3.0, 3.0).filter(lambda weight: abs(weight) > 1e-3)
 def test_a_term_over_a_denominator_has_its_value_and_is_known_again(parts):
     pool = Pool(2)
     terms = [0, 1, pool.product(0, 0), pool.product(0, 1), pool.add("cos", 1)]
-    denominator = tuple((terms[place], weight) for place, weight in parts)
+    denominator = Denominator(tuple((terms[place], weight) for place, weight in parts))
     node = over(pool, terms[3], denominator)
     x, y = rows = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 30))
     of_terms = [x, y, x * x, x * y, np.cos(y)]
@@ -108,7 +109,7 @@ def test_a_term_over_a_denominator_has_its_value_and_is_known_again(parts):
     with np.errstate(all="ignore"):
         expected = np.where(np.abs(below) > 1e-6, x * y / below, x * y)
     assert np.allclose(pool.values([node], rows.T)[:, 0], expected, rtol=1e-9)
-    assert quotient(pool, node) == (terms[3], tuple(sorted(denominator)))
+    assert quotient(pool, node) == (terms[3], Denominator(tuple(sorted(denominator.parts))))
 
 
 def test_other_nodes_are_no_quotients():
@@ -124,7 +125,7 @@ def test_constants_below_the_line_are_those_of_least_squares():
     problem, (chain, _) = problem_of(readings, signals)
     # A sensor with noise and nothing that disturbs: what is left is the sum of squares of the readings' errors.
     chain = chain.with_noise(chain.sensors, (1e-12, 0.0, 1.0))
-    ((_, found),) = refined(problem, chain, Quotient((), (0,), ((0, 0.3),)))
+    ((_, found),) = refined(problem, chain, Quotient((), (0,), Denominator(((0, 0.3),)))).parts
     start, middle, end = (problem.stages.start[:, 0], problem.stages.middle[:, 0], problem.stages.end[:, 0])
 
     def errors(parameters):
@@ -147,7 +148,7 @@ def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
     found = with_quotients(problem, signals, known, (), Walks(12_500, 16, Unit(0, (1,))))
     shared = denominators(pool, [term for sum_ in found for term in sum_.weights])
     assert len(shared) == 1
-    ((term, constant),) = shared[0]
+    ((term, constant),) = shared[0].parts
     assert term == 0
     assert constant == pytest.approx(1.25, rel=1e-4)
     assert all(new.description_length < old.description_length for new, old in zip(found, known, strict=True))
@@ -172,10 +173,13 @@ def test_a_denominator_whose_terms_are_dropped_while_another_one_is_refined_is_g
     signals = signals_of("sp", 8.0)
     problem, (chain, _) = problem_of(flown(saturating, (5.0, 0.2), 8.0), signals)
     pool = problem.pool
-    both = [over(pool, 0, ((0, 1.2),)), over(pool, pool.product(1, 1), ((pool.product(1, 1), 0.1),))]
+    both = [
+        over(pool, 0, Denominator(((0, 1.2),))),
+        over(pool, pool.product(1, 1), Denominator(((pool.product(1, 1), 0.1),))),
+    ]
     problem.usable(both)
     (found,) = renewed(problem, signals, [_fitted(problem, chain, both)], Walks(12_500, 16, Unit(0, (1,))))
-    ((term, constant),) = denominators(pool, found.weights)[0]
+    ((term, constant),) = denominators(pool, found.weights)[0].parts
     assert term == 0
     assert constant == pytest.approx(1.25, rel=1e-4)
     assert len(found.weights) == 1
@@ -198,8 +202,8 @@ def test_two_chains_pay_together_for_a_denominator_that_is_too_dear_for_each():
     found = with_quotients(problem, signals, known, (), walks)
     (shared,) = denominators(pool, [term for sum_ in found for term in sum_.weights])
     # Searched with s alone below the line, and lengthened by its square.
-    assert [term for term, _ in shared] == [0, pool.product(0, 0)]
-    assert [weight for _, weight in shared] == pytest.approx([1.0 / 0.6, 0.5 / 0.6], rel=0.1)
+    assert [term for term, _ in shared.parts] == [0, pool.product(0, 0)]
+    assert [weight for _, weight in shared.parts] == pytest.approx([1.0 / 0.6, 0.5 / 0.6], rel=0.1)
     assert all(over(pool, 0, shared) in sum_.weights for sum_ in found)
     # Alone neither gains as much as a denominator must.
     for new, old in zip(found, known, strict=True):
@@ -211,11 +215,12 @@ def test_two_chains_pay_together_for_a_denominator_that_is_too_dear_for_each():
 def test_a_denominator_stays_one_where_two_chains_share_it_and_it_is_refined():
     signals = signals_of("sp", 8.0)
     problem, both = problem_of(flown(saturating, (5.0, 0.2), 8.0, noise=0.01), signals)
-    ratio = over(problem.pool, 0, ((0, 1.0),))
+    ratio = over(problem.pool, 0, Denominator(((0, 1.0),)))
     problem.usable([ratio, 1])
     known = [_fitted(problem, chain, [ratio, 1][: i + 1]) for i, chain in enumerate(both)]
     found = renewed(problem, signals, known, Walks(12_500, 16, Unit(0, (1,))))
-    (((term, constant),),) = denominators(problem.pool, [term for sum_ in found for term in sum_.weights])
+    (shared,) = denominators(problem.pool, [term for sum_ in found for term in sum_.weights])
+    ((term, constant),) = shared.parts
     assert term == 0
     assert constant == pytest.approx(1.25, rel=0.1)
 
@@ -247,7 +252,7 @@ def test_which_state_saturates_shows_behind_noise():
     found = saturations(problem, signals, known, Walks(12_500, 16, Unit(0, (1,))))
     for repressor, quotients in zip((2, 0, 1), found, strict=True):
         steep = {problem.pool.product(*[repressor] * power) for power in (2, 4)}
-        assert steep & {candidate.denominator[0][0] for candidate in quotients}
+        assert steep & {candidate.denominator.parts[0][0] for candidate in quotients}
 
 
 def pulled(gap, rate, current, slope, fall):
@@ -271,11 +276,13 @@ def test_a_denominator_that_vanishes_where_the_runs_were_is_no_answer():
     fall = _fitted(problem, every[4].with_noise(every[4].sensors, (1e-2, 0.0, 1.0)), terms)
     ((first, *_),) = implicit(problem, signals, [fall], Walks(12_500, 16, Unit(0, (1,))))
     assert current[1] in first.above
-    assert {term for term, _ in first.denominator} <= {pool.product(*[0] * power) for power in (1, 2, 3, 4)}
+    assert {term for term, _ in first.denominator.parts} <= {
+        pool.product(*[0] * power) for power in (1, 2, 3, 4)
+    }
     ends = np.zeros((2, pool.inputs))
     ends[:, 0] = 6.0, 10.0
-    values = pool.values([term for term, _ in first.denominator], ends)
-    near, far = 1.0 + (values * np.array([weight for _, weight in first.denominator])).sum(axis=1)
+    values = pool.values([term for term, _ in first.denominator.parts], ends)
+    near, far = 1.0 + (values * np.array([weight for _, weight in first.denominator.parts])).sum(axis=1)
     # As the true one it grows, by about as much.
     assert near > 0.0
     assert far / near == pytest.approx((11.0 / 7.0) ** 2, rel=0.2)
@@ -289,10 +296,46 @@ def test_a_twin_of_noisy_readings_has_the_quotient_and_no_other_one():
     found = identify_runs([run], signals, options, workers=WORKERS)
     (sum_,) = found.sums
     (term,) = sum_.weights
-    over_it, ((under, _),) = quotient(found.pool, term)
+    over_it, below = quotient(found.pool, term)
+    ((under, _),) = below.parts
     assert (over_it, under) == (0, 0)
     states = np.array([0.1, 1.0, 4.0, 9.0])
     slope = found.model.program.run(np.column_stack([states, np.zeros(4)]))[:, 0]
     assert np.allclose(slope, -1.5 * states / (0.8 + states), rtol=0.03)
     bare = identify_runs([run], signals, replace(options, implicit=False), workers=WORKERS)
     assert denominators(bare.pool, [term for sum_ in bare.sums for term in sum_.weights]) == []
+
+
+def test_a_pendulum_on_a_rope_that_is_hoisted_has_its_length_below_the_line():
+    """Masses that a cart shares with its load can stand in for a length that varies little."""
+    duration, steps = 8.0, 200
+    names = {"rope": "m", "sway": "rad", "rate": "rad/s"}
+    signals = tl.Signals(
+        [
+            tl.State(name, unit, 1.0, derivative_of="sway" if name == "rate" else None)
+            for name, unit in names.items()
+        ],
+        [tl.Command("hoist", "m/s", (-1.0, 1.0))],
+        dt=duration / steps,
+    )
+    runs = []
+    for seed, start in enumerate(((1.0, 0.5, 0.0), (2.6, 0.8, 0.5))):
+        hoist = np.repeat([0.3, -0.1, 0.4, 0.2] if seed == 0 else [-0.4, -0.2, 0.2, -0.3], steps // 4)
+        states = [np.array(start)]
+        for u in hoist:
+
+            def slope(t, z, u=u):
+                return [u, z[2], (-9.81 * np.sin(z[1]) - 2.0 * u * z[2]) / z[0] - 0.1 * z[2]]
+
+            states.append(solve_ivp(slope, (0.0, signals.dt), states[-1], rtol=1e-9, atol=1e-11).y[:, -1])
+        noise = [1e-3, 1e-3, 3e-3] * np.random.default_rng(seed).standard_normal((steps + 1, 3))
+        runs.append(Run.of(np.array(states) + noise, hoist[:, np.newaxis]))
+    options = IdentificationOptions(form="acceleration", committee_size=2, parts=False)
+    found = identify_runs(runs, signals, options, workers=WORKERS)
+    (rate,) = (sum_ for sum_ in found.sums if signals.state_names.index("rate") in sum_.chain.states)
+    assert denominators(found.pool, rate.weights) == alone(found.pool, 0, 1.0)[:1]
+    inputs = np.array([[1.5, 0.4, 0.7, 0.2], [3.5, -1.2, 0.3, -0.5]])
+    rope, sway, turning, u = inputs.T
+    expected = (-9.81 * np.sin(sway) - 2.0 * u * turning) / rope - 0.1 * turning
+    outputs = found.model.program.run(inputs)
+    np.testing.assert_allclose(outputs[:, -1], expected, rtol=0.02)

@@ -1,6 +1,8 @@
 """Denominators: what is a term over one, and what only looks like it."""
 
-from twinloop.identification.terms.denominators import over, quotient
+import numpy as np
+
+from twinloop.identification.terms.denominators import RUNG, Denominator, alone, over, quotient
 from twinloop.identification.terms.joints import solution
 from twinloop.identification.terms.pool import Pool
 
@@ -8,15 +10,15 @@ from twinloop.identification.terms.pool import Pool
 def test_a_term_over_a_denominator_is_taken_apart_as_it_was_made() -> None:
     pool = Pool(3)
     square = pool.product(0, 0)
-    made = over(pool, 1, ((2, 0.5), (square, -0.25)))
-    assert quotient(pool, made) == (1, tuple(sorted(((2, 0.5), (square, -0.25)))))
+    made = over(pool, 1, Denominator(((2, 0.5), (square, -0.25))))
+    assert quotient(pool, made) == (1, Denominator(tuple(sorted(((2, 0.5), (square, -0.25))))))
 
 
 def test_one_over_a_denominator_is_a_quotient_and_so_is_a_quotient_over_another() -> None:
     pool = Pool(3)
-    one = over(pool, pool.one, ((2, 0.5),))
-    assert quotient(pool, one) == (pool.one, ((2, 0.5),))
-    assert quotient(pool, over(pool, one, ((0, -0.25),))) == (one, ((0, -0.25),))
+    one = over(pool, pool.one, Denominator(((2, 0.5),)))
+    assert quotient(pool, one) == (pool.one, Denominator(((2, 0.5),)))
+    assert quotient(pool, over(pool, one, Denominator(((0, -0.25),)))) == (one, Denominator(((0, -0.25),)))
 
 
 def test_accelerations_that_equations_of_joints_are_solved_to_are_no_quotients() -> None:
@@ -27,3 +29,15 @@ def test_accelerations_that_equations_of_joints_are_solved_to_are_no_quotients()
         assert node is not None
         assert pool[node[0]].operation == "/"
         assert quotient(pool, node[0]) is None
+
+
+def test_a_term_over_a_state_alone_is_one_where_it_was_made_as_such_not_where_the_ladder_divides() -> None:
+    pool = Pool(3)
+    for single, power in zip(alone(pool, 0, 2.0), (1, 2), strict=True):
+        node = over(pool, 1, single)
+        assert pool.values([node], np.array([[3.0, 5.0, 0.0]])) == 5.0 / 1.5**power
+        assert quotient(pool, node) is None
+        pool.rungs[node] = RUNG
+        assert quotient(pool, node) == (1, single)
+        pool.rungs[node] = RUNG + 1
+        assert quotient(pool, node) is None

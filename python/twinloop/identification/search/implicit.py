@@ -43,7 +43,7 @@ SINGULAR = 0.05
 VARIES = 1.5
 """Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
 LARGE = 100.0
-"""What a denominator's least value is below: beside more its 1 is nothing, and a term over it one of the ladder's."""
+"""What a denominator's least value is below: beside more its 1 is nothing, and a state alone is below the line."""
 FEW_TERMS = 2
 """Terms up to which a sum that leaves nothing but noise is believed: a quotient and its denominator are no fewer."""
 NOISE = 100.0
@@ -147,11 +147,19 @@ def matters(problem: Problem, denominator: Denominator) -> bool:
 
     Elsewhere in the envelope it must not vanish.
     """
-    values = problem.values([node for node, _ in denominator])
-    total = 1.0 + (values * np.array([weight for _, weight in denominator])).sum(axis=2)
+    values = problem.values(problem.usable(denominator.nodes))
+    total = denominator.one + (values * np.array([weight for _, weight in denominator.parts])).sum(axis=2)
     least, most = float(total.min()), float(total.max())
-    differs = least > max(NEAREST * most, SINGULAR) and most > VARIES * least and least < LARGE
-    return differs and vanishes_nowhere(problem.pool, denominator, problem.room)
+    if denominator.one:
+        away = least > max(NEAREST * most, SINGULAR) and least < LARGE
+    else:
+        away = least > SINGULAR * most
+    return away and most > VARIES * least and vanishes_nowhere(problem.pool, denominator, problem.room)
+
+
+def price_below(pool: Pool, denominator: Denominator, readings: int, runs: int) -> float:
+    """What a denominator costs, in units of χ²: its terms with their constants; a state alone has none."""
+    return float(prices(pool, denominator.nodes, readings if denominator.one else 1, runs).sum())
 
 
 def _masks(pool: Pool, signals: Signals, lower: Sequence[int]) -> list[Floats]:
@@ -239,7 +247,7 @@ def _quotients(
         at_zero = 1.0 - sum(weights[j] * float(middle[j - len(upper)]) for j in support)
         if at_zero == 0.0:
             continue
-        denominator = tuple((lower[j - len(upper)], weights[j] / at_zero) for j in support)
+        denominator = Denominator(tuple((lower[j - len(upper)], weights[j] / at_zero) for j in support))
         if matters(problem, denominator):
             found[support] = Quotient((), tuple(upper[j] for j in subset if j < len(upper)), denominator)
     return list(found.values())

@@ -45,15 +45,20 @@ def refined(problem: Problem, chain: Chain, quotient: Quotient) -> Denominator:
         chain: with its noise.
         quotient: with constants to begin with.
     """
-    nodes = [node for node, _ in quotient.denominator]
+    if not quotient.denominator.one:
+        return quotient.denominator  # it has no constants
+    nodes = quotient.denominator.nodes
     costs = prices(problem.pool, nodes, problem.readings(chain), len(problem.runs)).tolist()
     price = dict(zip(nodes, costs, strict=True))
     denominator, residual = _descended(problem, chain, quotient)
-    while len(denominator) > 1:
-        fewer = [tuple(part for part in denominator if part is not out) for out in denominator]
+    while len(denominator.parts) > 1:
+        fewer = [
+            Denominator(tuple(part for part in denominator.parts if part is not out))
+            for out in denominator.parts
+        ]
         tried = [
             (more - price[out[0]], number, (other, more))
-            for number, (out, parts) in enumerate(zip(denominator, fewer, strict=True))
+            for number, (out, parts) in enumerate(zip(denominator.parts, fewer, strict=True))
             if matters(problem, parts)
             for other, more in [_descended(problem, chain, replace(quotient, denominator=parts))]
         ]
@@ -65,11 +70,11 @@ def refined(problem: Problem, chain: Chain, quotient: Quotient) -> Denominator:
 
 def _descended(problem: Problem, chain: Chain, quotient: Quotient) -> tuple[Denominator, float]:
     """The denominator's constants where the least is residual, and that, in units of χ²."""
-    nodes = [node for node, _ in quotient.denominator]
+    nodes = quotient.denominator.nodes
     problem.usable([*quotient.plain, *quotient.above, *nodes])
     under, above = problem.values(nodes), problem.values(quotient.above)
     plain = problem.values(quotient.plain)
-    here = np.array([weight for _, weight in quotient.denominator])
+    here = np.array([weight for _, weight in quotient.denominator.parts])
     now = _at(problem, chain, plain, above, under, here)
     for _ in range(STEPS):
         step = None if now is None else _step(problem, chain, now)
@@ -87,7 +92,7 @@ def _descended(problem: Problem, chain: Chain, quotient: Quotient) -> tuple[Deno
         if gained < STILL * now.residual:
             break
     residual = np.inf if now is None else now.residual
-    return tuple(zip(nodes, here.tolist(), strict=True)), residual
+    return Denominator(tuple(zip(nodes, here.tolist(), strict=True))), residual
 
 
 def _at(

@@ -79,15 +79,19 @@ def _off_zero(bounds: Bounds) -> Bounds:
 
 
 def vanishes_nowhere(pool: Pool, denominator: Denominator, room: Sequence[Bounds]) -> bool:
-    """Whether a denominator stays above 0 on a grid over the room of its inputs.
+    """Whether a denominator stays above 0 on a grid over the room of its inputs; a state alone may end there.
 
     Args:
         pool: with its nodes.
         denominator: of states.
         room: bounds of each input; empty: nothing is known of it.
     """
-    nodes, weights = [node for node, _ in denominator], np.array([weight for _, weight in denominator])
-    return not room or bool((1.0 + (_on_grid(pool, nodes, room) * weights).sum(axis=1)).min() > 0.0)
+    if not room:
+        return True
+    weights = np.array([weight for _, weight in denominator.parts])
+    values = denominator.one + (_on_grid(pool, denominator.nodes, room) * weights).sum(axis=1)
+    least = float(values.min())
+    return least > 0.0 or (least == 0.0 and not denominator.one)
 
 
 def _on_grid(pool: Pool, nodes: Sequence[int], room: Sequence[Bounds]) -> Floats:

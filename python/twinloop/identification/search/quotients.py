@@ -13,17 +13,18 @@ from dataclasses import replace
 
 from twinloop._ground.elementary import log
 from twinloop.identification.description import shorter, shortest
-from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters
+from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters, price_below
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.saturation import saturations
-from twinloop.identification.search.structure import Sum, prices, search
+from twinloop.identification.search.saturation import inverses, saturations
+from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.denominators import (
     HIGHEST,
+    RUNG,
     Denominator,
-    above,
+    above_it,
     denominators,
     over,
     plain,
@@ -36,6 +37,8 @@ from twinloop.signals import Signals
 
 FIRST = 1000
 """Number of the first unit of work within a search's own, which has lower ones for itself."""
+ALONE = 5000
+"""Number of the first unit of work that looks for states alone below the line."""
 ROUNDS = 2
 """Denominators of one sum at most."""
 WORTH = 20.0
@@ -46,8 +49,6 @@ OWN = 10
 """Share of the moves, inverted, that a search among a few terms takes."""
 CHOICE = float(log(2.0))
 """Nats of the choice whether a term is over a denominator that is there."""
-RUNG = 0
-"""On which rung of the ladder quotients stand: their denominator is priced, constant by constant."""
 
 
 def with_quotients(
@@ -69,12 +70,11 @@ def with_quotients(
     best = finder.shared(known)
     for number in range(ROUNDS):
         candidates = [
-            [*first, *second]
-            for first, second in zip(
-                *(
-                    look(problem, signals, best, walks.part(FIRST + 2 * number + i))
-                    for i, look in enumerate((implicit, saturations))
-                ),
+            [*first, *second, *third]
+            for first, second, third in zip(
+                implicit(problem, signals, best, walks.part(FIRST + 2 * number)),
+                saturations(problem, signals, best, walks.part(FIRST + 2 * number + 1)),
+                inverses(problem, signals, best, walks.part(ALONE + number)),
                 strict=True,
             )
         ]
@@ -133,15 +133,15 @@ class _Finder:
         """
         best = found
         for own in self._all([found]):
-            alone = power_in(self.pool, own[0][0]) if len(own) == 1 else None
-            if alone is None:
+            single = power_in(self.pool, *own.nodes) if len(own.parts) == 1 else None
+            if single is None:
                 continue
-            state, power = alone
+            state, power = single
             split = self._split(best, own)
             without = tuple(term for term in split.plain if state not in self.pool.leaves(term))
             if power == HIGHEST or not split.above or without == split.plain:
                 continue
-            longer = (*own, (power_of(self.pool, state, power + 1), 0.0))
+            longer = Denominator((*own.parts, (power_of(self.pool, state, power + 1), 0.0)))
             again = self._with(known, Quotient(without, split.above, longer))
             if again is not None and shorter(again.description_length, best.description_length):
                 best = again
@@ -173,7 +173,7 @@ class _Finder:
                 own = bool(self._split(found, denominator).above) or bounded(self.problem, found)
                 if own or denominator not in self._all(others):
                     continue
-                alike = [each for each in self._all([found]) if _terms(each) == _terms(denominator)]
+                alike = [each for each in self._all([found]) if each.nodes == denominator.nodes]
                 tried = [self._carried(found, each, denominator, 0.0) for each in alike]
                 tried.append(self._searched(found.chain, denominator, found))
                 best[i] = shortest([found, *tried], lambda sum_: sum_.description_length)
@@ -182,8 +182,8 @@ class _Finder:
     def renewed(self, known: Sum) -> Sum:
         """A sum with its denominators refined."""
         for own in self._all([known]):
-            if not self._split(known, own).above:
-                continue  # what was refined before it has taken its terms
+            if not own.one or not self._split(known, own).above:
+                continue  # it has no constants, or what was refined before it has taken its terms
             there = refined(self.problem, known.chain, self._split(known, own))
             new = self._carried(known, own, there, self._share(own, [known]))
             known = new if shorter(new.description_length, known.description_length) else known
@@ -233,8 +233,7 @@ class _Finder:
             if (parts := quotient(self.pool, term)) is not None and parts[1] == denominator
         }
         chain = next(iter(over_it.values()))
-        nodes, readings = [node for node, _ in denominator], self.problem.readings(chain)
-        return 0.5 * float(prices(self.pool, nodes, readings, 1).sum()) / len(over_it)
+        return 0.5 * price_below(self.pool, denominator, self.problem.readings(chain), 1) / len(over_it)
 
     # Steps
 
@@ -269,9 +268,8 @@ class _Finder:
         self, chain: Chain, denominator: Denominator, known: Sum | None, extra: Sequence[int] = ()
     ) -> Sum:
         """The best sum among plain terms, those over a denominator, and some more; nothing is paid for that."""
-        lower = [node for node, _ in denominator]
         own = [] if known is None else [p[0] for t in known.weights if (p := quotient(self.pool, t))]
-        ratios = self._over([*above(self.pool, self.signals, lower), *own], denominator)
+        ratios = self._over([*above_it(self.pool, self.signals, denominator), *own], denominator)
         terms = [*plain(self.pool, self.signals), *ratios, *extra]
         return self._search(chain, terms, known, ratios, self.walks)
 
@@ -298,16 +296,15 @@ class _Finder:
         )
 
     def _cost(self, denominator: Denominator, chain: Chain) -> float:
-        nodes = [node for node, _ in denominator]
-        readings = self.problem.readings(chain)
-        return float(prices(self.pool, nodes, readings, len(self.problem.runs)).sum())
+        return price_below(self.pool, denominator, self.problem.readings(chain), len(self.problem.runs))
 
     def _split(self, found: Sum, denominator: Denominator) -> Quotient:
         """A sum's terms over a denominator, without that, and all others."""
+        wanted = Denominator(tuple(sorted(denominator.parts)), denominator.one)
         beside, over_it = [], []
         for term in found.weights:
             parts = quotient(self.pool, term)
-            if parts is not None and parts[1] == tuple(sorted(denominator)):
+            if parts is not None and parts[1] == wanted:
                 over_it.append(parts[0])
             else:
                 beside.append(term)
@@ -315,7 +312,3 @@ class _Finder:
 
     def _all(self, sums: Sequence[Sum]) -> list[Denominator]:
         return denominators(self.pool, (term for found in sums for term in found.weights))
-
-
-def _terms(denominator: Denominator) -> list[int]:
-    return [node for node, _ in denominator]

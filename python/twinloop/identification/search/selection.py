@@ -86,7 +86,7 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
 
 
 def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages, again: bool) -> Hypothesis:
-    """The hypothesis with shared masses, then quotients, where they pay; the very same where they do not.
+    """The hypothesis with quotients, then shared masses, where they pay; the very same where they do not.
 
     Args:
         context: of the identification.
@@ -103,11 +103,13 @@ def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages
     grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
     problem, signals = Problem(context, grown, inputs), context.signals
     walks = context.walks(grown.next_unit(context.unit), options.moves // 2)
-    sums = with_joints(problem, signals, grown.sums, walks) if context.may_couple else list(grown.sums)
     if again:
-        sums = renewed(problem, signals, sums, walks)
+        sums = renewed(problem, signals, grown.sums, walks)
     else:
-        sums = with_quotients(problem, signals, sums, grown.candidates.ladder[-1], walks)
+        sums = with_quotients(problem, signals, grown.sums, grown.candidates.ladder[-1], walks)
+    # After them: joints that share masses can stand in for one that hangs from a rope of changing length.
+    if context.may_couple:
+        sums = with_joints(problem, signals, sums, walks)
     changed = any(new is not old for new, old in zip(sums, grown.sums, strict=True))
     return grown.searched(sums) if changed else hypothesis
 

@@ -1,9 +1,10 @@
-"""Denominators: what terms may be divided by, 1 + Σ d φ, and the nodes of such quotients."""
+"""Denominators: what terms may be divided by, 1 + Σ d φ or a state alone, and the nodes of such quotients."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import combinations
+from typing import NamedTuple
 
 from twinloop.identification.terms.libraries import (
     angles,
@@ -14,14 +15,31 @@ from twinloop.identification.terms.libraries import (
     turn,
 )
 from twinloop.identification.terms.pool import Pool
-from twinloop.law.expressions import CONSTANT
+from twinloop.law.expressions import CONSTANT, INPUT, SHARE
 from twinloop.signals import Signals, rates
 
 HIGHEST = 4
 """Power of a state below the line at most: of Hill's law for four places that bind together."""
 
-Denominator = tuple[tuple[int, float], ...]
-"""Terms with their coefficients, all that is added to 1."""
+RUNG = 0
+"""On which rung of the ladder quotients stand: their denominator is priced, constant by constant."""
+
+
+class Denominator(NamedTuple):
+    """What terms are divided by.
+
+    Args:
+        parts: nodes with their coefficients.
+        one: 1, to which they are added; 0 of a state alone, or its square, in units of the scale.
+    """
+
+    parts: tuple[tuple[int, float], ...]
+    one: float = 1.0
+
+    @property
+    def nodes(self) -> list[int]:
+        """Its terms."""
+        return [node for node, _ in self.parts]
 
 
 def below(pool: Pool, signals: Signals) -> list[int]:
@@ -37,6 +55,12 @@ def below(pool: Pool, signals: Signals) -> list[int]:
         wave = pool.wave("cos", i, turn(signals.states[i]))
         found += [wave, pool.product(wave, wave)]
     return list(dict.fromkeys(found))
+
+
+def alone(pool: Pool, state: int, scale: float) -> list[Denominator]:
+    """A state alone, and its square, in units of its scale: what is too small to divide by depends on no unit."""
+    share = pool.share(state, scale)
+    return [Denominator(((node, 1.0),), 0.0) for node in (share, pool.product(share, share))]
 
 
 def power_of(pool: Pool, node: int, power: int) -> int:
@@ -55,7 +79,7 @@ def power_in(pool: Pool, node: int) -> tuple[int, int] | None:
 
 def states_in(pool: Pool, denominator: Denominator) -> set[int | None]:
     """The states that a denominator is made of."""
-    return {leaf for node, _ in denominator for leaf in pool.leaves(node)}
+    return {leaf for node in denominator.nodes for leaf in pool.leaves(node)}
 
 
 def plain(pool: Pool, signals: Signals) -> list[int]:
@@ -67,19 +91,30 @@ def plain(pool: Pool, signals: Signals) -> list[int]:
 
 
 def above(pool: Pool, signals: Signals, lower: Iterable[int]) -> list[int]:
-    """Terms above the line: what is plain, and each term of the denominator alone and times each input."""
+    """Terms above a line: what is plain, and each term below it alone and times each input."""
     inputs = coordinates(pool, signals)
     products = (pool.product(i, term) for term in lower for i in inputs)
     return list(dict.fromkeys([*plain(pool, signals), *lower, *products]))
 
 
-def over(pool: Pool, term: int, denominator: Denominator) -> int:
-    """The node of a term over 1 + Σ d φ.
+def above_it(pool: Pool, signals: Signals, denominator: Denominator) -> list[int]:
+    """Terms above the line of a denominator; above a state alone nothing that it would cancel."""
+    if denominator.one:
+        return above(pool, signals, denominator.nodes)
+    below_it = states_in(pool, denominator)
+    return [term for term in plain(pool, signals) if below_it.isdisjoint(pool.leaves(term))]
 
-    It is written as 1 − Σ (−d) φ: so tuning leaves the 1 as it is, and every other constant has a value of its own.
+
+def over(pool: Pool, term: int, denominator: Denominator) -> int:
+    """The node of a term over a denominator.
+
+    1 + Σ d φ is written as 1 − Σ (−d) φ: so tuning leaves the 1 as it is, and every other constant has a value of
+    its own.
     """
+    if not denominator.one:
+        return pool.add("/", term, *denominator.nodes)
     total: int | None = None
-    for node, weight in denominator:
+    for node, weight in denominator.parts:
         part = pool.add("*", node, pool.constant(-weight))
         total = part if total is None else pool.add("+", total, part)
     assert total is not None
@@ -89,11 +124,15 @@ def over(pool: Pool, term: int, denominator: Denominator) -> int:
 def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
     """What is above the line and what is below it, of a node that `over` has made; None for all others."""
     operation, operands, _ = pool[number]
-    lower = pool[operands[1]] if operation == "/" else None
-    if lower is None or lower.operation != "-" or lower.operands[0] != pool.one:
-        return None
-    if _is_weighted(pool, operands[0]):
+    if operation != "/" or _is_weighted(pool, operands[0]):
         # What joints that share masses are solved to has such a form, too, and is priced as a whole.
+        return None
+    lower = pool[operands[1]]
+    if _is_alone(pool, operands[1]):
+        # The ladder divides by states as well, and prices what it divides.
+        below_it = Denominator(((operands[1], 1.0),), 0.0)
+        return (operands[0], below_it) if pool.rungs.get(number) == RUNG else None
+    if lower.operation != "-" or lower.operands[0] != pool.one:
         return None
     parts, waiting = [], [lower.operands[1]]
     while waiting:
@@ -106,7 +145,15 @@ def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
             return None
         (term,) = (i for i in node.operands if i != constants[0])
         parts.append((term, -pool[constants[0]].value))
-    return operands[0], tuple(sorted(parts))
+    return operands[0], Denominator(tuple(sorted(parts)))
+
+
+def _is_alone(pool: Pool, number: int) -> bool:
+    """Whether a node is a state's share of its scale, or the square of that."""
+    operation, operands, _ = pool[number]
+    if operation == "*" and operands[0] == operands[1]:
+        operation, operands, _ = pool[operands[0]]
+    return operation == SHARE and pool[operands[0]].operation == INPUT
 
 
 def _is_weighted(pool: Pool, number: int) -> bool:
