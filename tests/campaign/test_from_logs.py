@@ -74,6 +74,30 @@ def test_the_one_log_with_a_wrong_sign_is_named_instead_of_the_wind():
     assert not any("wind" in each.sentence for each in found.values())
 
 
+def pushed(seed, dt=0.05):
+    """A cart that a thrust in % pushes against the wind."""
+    stream = np.random.default_rng(seed)
+    thrust, speed = np.repeat(stream.uniform(20.0, 90.0, 12), 12), [3.0]
+    for u in thrust:
+        speed.append(speed[-1] + dt * (0.1 * u - speed[-1] - 0.05 * speed[-1] * abs(speed[-1])))
+    readings = np.array(speed) + 0.01 * stream.standard_normal(len(speed))
+    return tl.Trajectory(dt * np.arange(len(speed)), readings[:, np.newaxis], thrust[:, np.newaxis])
+
+
+@pytest.mark.filterwarnings("ignore::twinloop.errors.RemarkWarning")
+def test_a_log_in_another_unit_is_named_though_a_law_with_terms_for_it_alone_explains_all():
+    cart = tl.Signals([tl.State("speed", "m/s", 5.0)], [tl.Command("thrust", "%", (0.0, 100.0))], 0.05)
+    runs = [pushed(seed) for seed in range(3)]
+    healthy = tl.identify(runs, cart, options=SMALL, threads=1)
+    assert "odd-one-out" not in [each.code for each in healthy.remarks] and "Max" not in healthy.equations()
+    runs[2] = dataclasses.replace(runs[2], commands=runs[2].commands / 100.0)
+    twin = tl.identify(runs, cart, options=SMALL, threads=1)
+    # Two terms begin where only the third log has been.
+    assert twin.follows and "Max" in twin.equations()
+    (said,) = (each for each in twin.remarks if each.code == "odd-one-out")
+    assert said.serious and "with its thrust multiplied by about 100" in said.sentence
+
+
 @pytest.mark.filterwarnings("ignore::twinloop.errors.RemarkWarning")
 def test_where_a_law_explains_all_logs_none_is_accused_though_no_linear_law_does():
     """A heater takes its voltage squared: to a linear law the log below 0 has the other sign."""
@@ -85,7 +109,7 @@ def test_where_a_law_explains_all_logs_none_is_accused_though_no_linear_law_does
         for (u,) in commands:
             heat.append(heat[-1] + 0.05 * (3.0 * u * u - heat[-1]))
         runs.append(tl.Trajectory(0.05 * np.arange(151), np.array(heat)[:, np.newaxis], commands))
-    assert len(list(odd_one_out(runs, ["0.csv", "1.csv", "2.csv"], heater))) == 1
+    assert odd_one_out(runs, heater).place == 2
     twin = tl.identify(runs, heater, options=SMALL, threads=1)
     assert twin.follows and "odd-one-out" not in [each.code for each in twin.remarks]
 

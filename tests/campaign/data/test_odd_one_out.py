@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop.campaign.data.odd_one_out import odd_one_out
+from twinloop.campaign.data.odd_one_out import odd_one_out, said_odd
 
 DT = 0.02
 ARM = tl.Signals(
@@ -60,7 +60,8 @@ def flown(law, stream, signals=PLAIN, steps=250):
 
 def said(flights, signals=PLAIN):
     return [
-        each.sentence for each in odd_one_out(flights, [f"{k}.csv" for k in range(len(flights))], signals)
+        each.sentence
+        for each in said_odd(odd_one_out(flights, signals), [f"{k}.csv" for k in range(len(flights))])
     ]
 
 
@@ -149,3 +150,21 @@ def test_a_log_at_another_speed_or_load_is_another_machine_and_no_other_unit(spe
     assert [
         sentence for sentence in said(logs, PLAIN) if "divided" in sentence or "multiplied" in sentence
     ] == []
+
+
+def test_the_odd_one_is_put_right_by_the_change_that_is_said():
+    flights = near(0)
+    for scale, shrunk in (
+        (np.array([1.0, 180.0 / np.pi]), np.log(180.0 / np.pi)),
+        (np.array([1.0, -1.0]), 0.0),
+    ):
+        wrong = dataclasses.replace(flights[2], states=flights[2].states * scale)
+        odd = odd_one_out([*flights[:2], wrong, flights[3]], ARM)
+        np.testing.assert_allclose(odd.righted.states, flights[2].states, rtol=1e-12)
+        np.testing.assert_array_equal(odd.righted.commands, flights[2].commands)
+        assert (odd.place, odd.compared, odd.shrunk) == (2, 4, pytest.approx(shrunk))
+    wrong = dataclasses.replace(flights[2], commands=1000.0 * flights[2].commands)
+    odd = odd_one_out([*flights[:2], wrong, flights[3]], ARM)
+    np.testing.assert_allclose(odd.righted.commands, flights[2].commands, rtol=1e-12)
+    np.testing.assert_array_equal(odd.righted.states, flights[2].states)
+    assert odd.shrunk == 0.0

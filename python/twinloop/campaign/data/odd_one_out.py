@@ -4,19 +4,24 @@ No law explains flights of which one has a column with the wrong sign. A linear 
 predicts those, and misses this one by as much as it moves. That alone would accuse a flight under other gains, or at
 another place, where a nonlinear system has other slopes. So it is said only where the same law predicts the flight once
 a column has the other sign or another unit, or two columns are exchanged.
+
+A law that is free enough explains it all the same, with terms that turn a command round where the odd one flew. Whether
+that is so, or the system is one that no linear law explains, shows in the law of the flights once it is put right
+(`identify_and_plan/contradicting.py`).
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats, Integers
+from twinloop._ground.elementary import log
 from twinloop.remarks import Remark, serious
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -76,6 +81,15 @@ class _Change:
         right: Squares = flight[np.ix_(self.order, self.order)] / self.factors / self.factors[:, np.newaxis]
         return right
 
+    def of(self, flight: Trajectory) -> Trajectory:
+        """A flight as it was recorded, with its columns put right."""
+        n_x, columns = flight.states.shape[1], self.order[1:] - 1
+        factors = self.factors[1:]
+        states = flight.states[:, columns[:n_x]] / factors[:n_x]
+        n_u = flight.commands.shape[1]
+        commands = flight.commands[:, columns[n_x : n_x + n_u] - n_x] / factors[n_x : n_x + n_u]
+        return replace(flight, states=states, commands=commands)
+
     def matters(self, flight: Squares, law: Floats, explained: np.ndarray) -> bool:
         """Whether the law needs what was scaled: a state that it predicts, or a cause of one.
 
@@ -104,31 +118,62 @@ class _Suspect(NamedTuple):
     change: _Change | None
 
 
-def odd_one_out(flights: Sequence[Trajectory], names: Sequence[str], signals: Signals) -> Iterator[Remark]:
-    """The one flight that contradicts all others, where there is one.
+class Odd(NamedTuple):
+    """A flight that contradicts all others.
 
     Args:
-        flights: that no law explains together.
-        names: what each is called.
-        signals: of the system.
+        place: among the flights.
+        words: with what change it agrees with them.
+        righted: the same flight after that.
+        shrunk: by which factor its states are smaller then, logarithms of all of them together.
+        compared: how many flights were compared.
+    """
+
+    place: int
+    words: str
+    righted: Trajectory
+    shrunk: float
+    compared: int
+
+
+def odd_one_out(flights: Sequence[Trajectory], signals: Signals) -> Odd | None:
+    """The one flight that contradicts all others; None where there is none.
+
+    Args:
+        flights: of one system.
+        signals: of it.
     """
     kept = _distinct(flights, 3 * (1 + signals.n_x + signals.n_u) + max(WINDOWS))[-FLIGHTS:]
     if len(kept) < 3:
-        return
+        return None
     changes = list(_changes(signals))
     squares = ([_squares(flights[place], window) for place in kept] for window in WINDOWS)
     found = [suspect for of_window in squares for suspect in _suspects(of_window, changes, signals.n_x)]
     named = Counter(suspect.change.words for suspect in found if suspect.change is not None)
     words, windows = next(iter(named.most_common(1)), ("", 0))
     if windows < AGREEING or len({suspect.place for suspect in found}) > 1:
-        return
-    name = names[kept[found[0].place]]
-    yield serious(
-        "odd-one-out",
-        f"Without {name} one linear law explains most of the other {len(kept) - 1} flights that were compared. It"
-        f" does not explain {name}, but would {words}: check the signs, units and order of its columns, and whether"
-        " it was flown as the others were (load, speed, direction).",
-    )
+        return None
+    change = next(each.change for each in found if each.change is not None and each.change.words == words)
+    place = kept[found[0].place]
+    shrunk = float(log(np.abs(change.factors[1 : 1 + signals.n_x])).sum())
+    return Odd(place, words, change.of(flights[place]), shrunk, len(kept))
+
+
+def said_odd(odd: Odd | None, names: Sequence[str]) -> Iterator[Remark]:
+    """That one flight contradicts all others.
+
+    Args:
+        odd: the one; None: there is none.
+        names: what each flight is called.
+    """
+    if odd is not None:
+        name = names[odd.place]
+        yield serious(
+            "odd-one-out",
+            f"Without {name} one linear law explains most of the other {odd.compared - 1} flights that were compared."
+            f" It does not explain {name}, but would {odd.words}: check the signs, units and order of its columns, and"
+            " whether it was flown as the others were (load, speed, direction).",
+        )
 
 
 def _distinct(flights: Sequence[Trajectory], least: int) -> list[int]:

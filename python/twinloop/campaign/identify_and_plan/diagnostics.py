@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 from twinloop._ground.texts import two_digits
 from twinloop.campaign.data.declared import against_derivatives
-from twinloop.campaign.data.odd_one_out import odd_one_out
+from twinloop.campaign.data.odd_one_out import Odd, said_odd
 from twinloop.campaign.data.readings import at_rest, suspicious
 from twinloop.campaign.data.rows import Shifted
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.history import Experiment, called
+from twinloop.campaign.identify_and_plan.contradicting import odd_log
 from twinloop.campaign.identify_and_plan.elsewhere import NOWHERE, Elsewhere
 from twinloop.campaign.identify_and_plan.misses import FREE_RUN, Miss
 from twinloop.campaign.identify_and_plan.selection import distinct
@@ -46,6 +47,7 @@ class Findings:
         disturbed: states with disturbances that would take free runs of a right twin as far; empty: none would.
         elsewhere: under how many controllers what is learnt is still open.
         explained: whether a law explains the flights.
+        odd: the log that contradicts the others, where only a law that was made for it explains them.
     """
 
     follows: bool
@@ -60,6 +62,7 @@ class Findings:
     disturbed: Sequence[str] = ()
     elsewhere: Elsewhere = NOWHERE
     explained: bool = True
+    odd: Odd | None = None
 
 
 def diagnostics_of(
@@ -81,10 +84,10 @@ def diagnostics_of(
         signals,
         lambda k, row: f"in run {k + 1} of {len(experiments)} at {experiments[k].trajectory.t[row]:g} s",
     )
-    odd = () if found.explained and not found.misses else _odd_log(experiments, recorded, signals)
+    odd = found.odd if found.explained and not found.misses else odd_log(experiments, signals)
     said = [
         *wrapped,
-        *odd,
+        *said_odd(odd, called(experiments)),
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
         *_nothing_moved(recorded),
@@ -100,16 +103,6 @@ def diagnostics_of(
         said += _elsewhere(found.elsewhere)
     said += [*_model_error(found.recurring), *_copies(experiments), *_none_complete(experiments, steps)]
     return [*said, *_missed_predictions(experiments)]
-
-
-def _odd_log(
-    experiments: Sequence[Experiment], recorded: Sequence[Trajectory], signals: Signals
-) -> Iterator[Remark]:
-    """The one log that contradicts all others. Of a test its own controller shows what is wrong with its columns."""
-    logs = [place for place, run in enumerate(experiments) if run.attached]
-    if logs:
-        names = called(experiments)
-        yield from odd_one_out([recorded[place] for place in logs], [names[place] for place in logs], signals)
 
 
 def _nothing_moved(recorded: Sequence[Trajectory]) -> Iterator[Remark]:

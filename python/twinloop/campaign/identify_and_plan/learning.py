@@ -11,9 +11,11 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
 from twinloop._ground.streams import Unit
 from twinloop.campaign.data.levels import levels_of
+from twinloop.campaign.data.odd_one_out import Odd
 from twinloop.campaign.data.reports import reports_in
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
+from twinloop.campaign.identify_and_plan.contradicting import is_made_for, odd_log, righted
 from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, drawn_controllers, lasting_under
 from twinloop.campaign.identify_and_plan.inside import enough_inside, inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
@@ -46,6 +48,8 @@ AGAIN = 2_000_000
 """Added likewise where the law known before is tuned again."""
 INSIDE_ONLY = 3_000_000
 """Added likewise where flights are learnt only as far as they were inside their envelope."""
+RIGHTED = 4_000_000
+"""Added likewise where a log that contradicts the others was put right."""
 ROUGH = serious(
     "rough",
     "No law explains the flights, and a linear one follows them in free run, or predicted later ones, better than"
@@ -153,10 +157,11 @@ class Learner:
             answer, two = self._of_two(answer, told.answered(rough, number=2), two, told)
         if asked is not None and self.options.earlier_twin and not answer.explained:
             answer = or_foretold(answer, asked.identified, asked.experiments, told.answered)
+        odd = self._contradicting(answer, book.experiments)
         identified = answer.identified
         model = None if earlier is None else earlier.model
         lesson = lesson_of(
-            answer, is_rough(identified), book, told.flights, told.selected, model, self.workers
+            answer, is_rough(identified), book, told.flights, told.selected, model, odd, self.workers
         )
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -176,6 +181,15 @@ class Learner:
         return replace(
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
         )
+
+    def _contradicting(self, answer: Answer, experiments: Sequence[Experiment]) -> Odd | None:
+        """The log that contradicts all others, where the law that explains them was made for it."""
+        odd = odd_log(experiments, self.setup.signals) if answer.explained else None
+        if odd is None:
+            return None
+        told = self._told(righted(experiments, odd))
+        of_righted = told.identify(self.options, iteration=RIGHTED + len(experiments))
+        return odd if is_made_for(answer.identified, odd, of_righted) else None
 
     def _told(self, experiments: Sequence[Experiment]) -> Told:
         """What is learnt from experiments, and what answers are held against."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from twinloop._ground.streams import Unit
 from twinloop.campaign.data.begun import from_other_starts
 from twinloop.campaign.data.gains import from_other_gains
 from twinloop.campaign.data.levels import levels_said
+from twinloop.campaign.data.odd_one_out import Odd
 from twinloop.campaign.data.rows import from_late_commands, in_other_rows
-from twinloop.campaign.data.sent import other_commands
+from twinloop.campaign.data.sent import change_that_rights, other_commands
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of
@@ -32,6 +34,7 @@ def lesson_of(
     flights: Sequence[Experiment],
     selected: Sequence[Selected],
     before: _core.Model | None,
+    odd: Odd | None,
     workers: _core.Workers,
 ) -> Lesson:
     """The record of what was learnt.
@@ -43,11 +46,13 @@ def lesson_of(
         flights: of the book, as far as they were learnt, without single readings that are wrong.
         selected: what was learnt from.
         before: the law that was known before the last of the flights; None: none was.
+        odd: the log that contradicts the others, though a law made for it explains them; None: none does.
         workers: how the work is carried out.
     """
     identified, signals = answer.identified, book.setup.signals
     free = free_errors(identified.members[0], book, workers, identified.noise(signals))
-    found = findings(answer, book, flights, [each.length for each in free], before, workers)
+    pieces = [each.length for each in free]
+    found = replace(findings(answer, book, flights, pieces, before, workers), odd=odd)
     explained = answer.follows and not found.misses and not rough
     actuators = claimed(identified.actuation, signals, explained)
     return Lesson(
@@ -89,6 +94,18 @@ def lesson_of(
     )
 
 
+def _others(answer: Answer, experiments: Sequence[Experiment]) -> list[int]:
+    """Numbers of the tests whose recorded commands are none that their controllers give.
+
+    Where the twin follows the flights, a rig may well answer otherwise than its controller, as a relay does. Then only
+    those count whose commands are the controller's once a column is put right.
+    """
+    found = other_commands(experiments)
+    if not answer.follows:
+        return found
+    return [run.number for run in experiments if run.number in found and change_that_rights(run)]
+
+
 def findings(
     answer: Answer,
     book: Logbook,
@@ -115,7 +132,7 @@ def findings(
         # Of a model that diverges it is said already.
         follows=answer.follows or not np.isfinite(identified.chi_squared),
         misses=answer.misses(flights, setup, workers),
-        others=() if answer.follows else other_commands(book.experiments),
+        others=_others(answer, book.experiments),
         late=in_other_rows(book.experiments),
         recurring=tuple(names[state] for state, cause in answer.causes.items() if cause == "law"),
         unanswered=any(each.serious and each.code == "never-moved" for each in identified.remarks),
