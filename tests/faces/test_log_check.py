@@ -192,6 +192,59 @@ def test_of_a_wrong_period_no_consequences_are_told(checked, change, codes):
     assert {each["code"] for each in json.loads(checked(change, "--json").stdout)["remarks"]} == codes
 
 
+def spaced(*steps):
+    """Rows that are so far apart, s, again and again."""
+
+    def change(log):
+        log["t"] = np.r_[0.0, np.cumsum(np.resize(steps, len(log["t"]) - 1))]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("steps", "worst"), [((0.06, 0.04), 20), ((0.04, 0.06), 20), ((0.04, 0.04, 0.07), 40), ((0.08, 0.02), 60)]
+)
+@pytest.mark.parametrize("rows", [120, 121])
+def test_times_that_jitter_around_their_period_are_no_other_period(checked, steps, worst, rows):
+    def change(log):
+        without(range(rows, 121))(log)  # the median of an odd number of steps is one of them
+        spaced(*steps)(log)
+
+    said = checked(change)
+    assert said.exit_code == 1 and "apart" not in said.stdout and "missing" not in said.stdout
+    assert f"departs by up to {worst} % from dt" in said.stdout and "write even times" in said.stdout
+    found = json.loads(checked(change, "--json").stdout)
+    assert {each["code"] for each in found["remarks"]} == {"jitter"} and found["gaps"] == 0
+    assert found["period"] == pytest.approx(0.05, rel=0.01) and found["jitter"] == pytest.approx(worst / 100)
+
+
+@pytest.mark.parametrize(
+    ("steps", "told"),
+    [
+        ((0.025,), 0.025),
+        ((0.026, 0.026, 0.024), 0.026),
+        ((0.1,), 0.1),
+        # Rows that were lost on the way do not make another period the declared one.
+        ((*[0.025] * 20, 0.5), 0.025),
+        ((*[0.025] * 5, 0.075), 0.025),
+    ],
+)
+def test_a_log_of_another_period_is_told_it(checked, steps, told):
+    said = checked(spaced(*steps))
+    assert said.exit_code == 1 and f"Rows are {told:g} s apart" in said.stdout
+
+
+def test_rows_that_are_lost_where_times_jitter_are_said_to_be(checked):
+    def change(log):
+        spaced(0.06, 0.04)(log)
+        without([30])(log)
+
+    found = {
+        each["code"]: each["sentence"] for each in json.loads(checked(change, "--json").stdout)["remarks"]
+    }
+    assert set(found) == {"gaps", "jitter"} and "in 1 place, about 1 in all" in found["gaps"]
+
+
 def repeated(log):
     for name, values in log.items():
         log[name] = np.repeat(values, 3)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
@@ -36,6 +37,8 @@ from twinloop.unmeasured import completed_readings, lacks
 
 LOST = 1.5
 """Periods between two rows from which rows were lost."""
+FAR = 1.75
+"""The same where times jitter: more than most rows come late by, less than a lost row takes."""
 MOVED = 3.0
 """Standard deviations of its noise, as guessed from above, that a state must have moved for anything to be learnt."""
 SATURATED = 0.5
@@ -84,7 +87,8 @@ class LogCheck:
     Args:
         rows: number of rows.
         seconds: from the first to the last time.
-        period: the median time between two rows, s; None with fewer than two rows.
+        period: the median time between two rows, s; the mean where times jitter around the declared period; None with
+            fewer than two rows.
         jitter: largest deviation from the declared period without a lost row, as a share of the period.
         gaps: number of pairs of rows with lost rows between them.
         longest_gap: s; None without a gap.
@@ -137,7 +141,7 @@ def _checked(
         of_others = {signals.state_names[i] for i in signals.unmeasured}
     steps = np.diff(t)
     known = steps[np.isfinite(steps)]
-    lost = known > LOST * signals.dt
+    lost = _lost(known, signals.dt)
     near = known[~lost]
     remarks = [*_of_times(t, known, signals.dt, lines)]
     columns = (*_states(states, signals), *_commands(commands, signals))
@@ -154,7 +158,7 @@ def _checked(
     return LogCheck(
         rows=len(t),
         seconds=float(t[-1] - t[0]) if len(t) else 0.0,
-        period=float(np.median(known)) if len(known) else None,
+        period=_period(known, signals.dt) if len(known) else None,
         jitter=float(np.abs(near / signals.dt - 1.0).max()) if len(near) else None,
         gaps=int(lost.sum()),
         longest_gap=float(known[lost].max()) if lost.any() else None,
@@ -210,15 +214,15 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
     if (steps <= 0.0).any():
         yield serious("order", _disorder(t, steps, lines))
         return
-    period = float(np.median(steps))
-    if abs(period / dt - 1.0) > JITTER:
+    period = _period(steps, dt)
+    if _is_other(period, dt):
         yield serious(
             "period",
             f"Rows are {period:.6g} s apart ({1.0 / period:.4g} Hz), {dt:g} s are declared: downsample the log, declare"
             " its own period as dt, or look whether t is in s.",
         )
         return
-    lost = steps > LOST * dt
+    lost = _lost(steps, dt)
     if lost.any():
         rows = int(np.rint(steps[lost] / dt - 1.0).sum())
         first = int(np.argmax(lost))
@@ -234,6 +238,30 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
             f"The time between two rows departs by up to {two_digits(100.0 * worst)} % from dt; {100.0 * JITTER:g} %"
             " are allowed. Where the loop only jitters around its period, write even times.",
         )
+
+
+def _period(steps: Floats, dt: float) -> float:
+    """The time from one row to the next, without lost rows.
+
+    The median is that of the rows that come late, or early, where those alternate: then the mean tells.
+    """
+    return float(steps[steps <= FAR * dt].mean() if _jitters(steps, dt) else np.median(steps))
+
+
+def _jitters(steps: Floats, dt: float) -> bool:
+    """Whether most rows come late or early, around the declared period."""
+    near = steps[steps <= FAR * dt]
+    uneven = len(near) > 0 and float(np.median(np.abs(steps / dt - 1.0))) > JITTER
+    return uneven and not _is_other(float(near.mean()), dt)
+
+
+def _is_other(period: float, dt: float) -> bool:
+    return abs(period / dt - 1.0) > JITTER
+
+
+def _lost(steps: Floats, dt: float) -> NDArray[np.bool_]:
+    """Between which rows others were lost."""
+    return steps > (FAR if _jitters(steps, dt) else LOST) * dt
 
 
 def _disorder(t: Floats, steps: Floats, lines: Sequence[int] | None) -> str:
