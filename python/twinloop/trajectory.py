@@ -11,6 +11,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats
 from twinloop._ground.showing import Shown
 from twinloop._ground.texts import in_unit, text
+from twinloop._ground.times import moment
 from twinloop._ground.values import Value
 from twinloop.errors import AtRow, InvalidInput, unknown
 from twinloop.records import Recorded
@@ -61,8 +62,9 @@ class Trajectory(Shown, Value, Recorded, kind="trajectory"):
         commands = floats("Trajectory.commands (one row less than states)", self.commands, (len(t) - 1, None))
         if len(t) > 1 and float(np.diff(t).min()) <= 0.0:
             k = int(np.argmin(np.diff(t)))
+            before, after = (moment(each, float(t[k] - t[k + 1])) for each in (t[k], t[k + 1]))
             raise AtRow(
-                f"Trajectory.t: expected times that grow, found {t[k]:g} s and then {t[k + 1]:g} s at",
+                f"Trajectory.t: expected times that grow, found {before} s and then {after} s at",
                 k + 1,
                 "; sort the record or remove repeated rows.",
             )
@@ -158,8 +160,9 @@ def check_period(trajectory: Trajectory, signals: Signals) -> None:
         raise AtRow(
             f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s after",
             worst,
-            f", t = {trajectory.t[worst]:g} s; put in a row that was lost, give t in s, or declare the system's own"
-            " period as dt. Where the loop only jitters around it, pass the even times dt * np.arange(n + 1).",
+            f", t = {moment(trajectory.t[worst], signals.dt)} s; put in a row that was lost, give t in s, or declare"
+            " the system's own period as dt. Where the loop only jitters around it, pass the even times"
+            " dt * np.arange(n + 1).",
         )
 
 

@@ -264,6 +264,29 @@ def test_rows_that_are_repeated_or_in_reverse_are_said_to_be(checked):
     assert "in reverse order, the last time first: sort them by t" in said.stdout
 
 
+def test_times_since_1970_have_the_digits_in_which_they_differ(checked, tmp_path):
+    def since_1970(*changes):
+        def change(log):
+            log["t"] = log["t"] + 1.7e9
+            for each in changes:
+                each(log)
+
+        return change
+
+    def refused():
+        return invoke("identify", str(tmp_path / "flight.csv"), "--config", str(tmp_path / "rig.toml")).stderr
+
+    back = since_1970(changed("t", 1.7e9 + 2.4, 50))
+    assert "line 52, from 1700000002.45 s to 1700000002.4 s: sort" in checked(back).stdout
+    assert "found 1700000002.45 s and then 1700000002.4 s at line 52" in refused()
+    copy = since_1970(changed("t", 1.7e9 + 2.45, 50))
+    assert "the first at line 52, 1700000002.45 s: remove" in checked(copy).stdout
+    assert "after 1700000002.45 s (line 51)" in checked(since_1970(without([50]))).stdout
+    assert "after line 51, t = 1700000002.45 s; put in a row" in refused()
+    assert "has no finite number" in checked(since_1970(changed("rate", np.nan, [50, 51]))).stdout
+    assert "line 52, t = 1700000002.5 s (2 such rows)" in refused()
+
+
 def test_empty_cells_of_a_historian_are_counted_and_a_slow_period_is_told_in_seconds(tmp_path):
     (tmp_path / "oven.toml").write_text(
         'dt = 10.0\n[states.heat]\nunit = "K"\nscale = 10.0\n[commands.power]\nunit = "W"\nbounds = [0.0, 9.0]\n'

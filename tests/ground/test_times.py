@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from twinloop._ground.times import shown_time, time_unit
+from twinloop._ground.times import moment, shown_time, time_unit
 
 
 @pytest.mark.parametrize(
@@ -44,3 +44,22 @@ def test_digits_are_as_many_as_asked_for_and_never_a_power_of_ten():
 )
 def test_a_column_has_the_unit_of_its_longest_time(column, unit):
     assert time_unit(column) == unit
+
+
+@pytest.mark.parametrize(
+    ("t", "apart", "said"),
+    [
+        (1.45, 0.05, "1.45"),
+        (0.1 + 0.2, 0.0, "0.3"),
+        (2000000.0, 0.02, "2000000"),
+        (1700000000.02, 0.02, "1700000000.02"),
+        (1700000000.02, 100.0, "1700000000"),
+        (1700000000.02, 0.0, "1700000000.02"),
+        (86400.000001, 1e-6, "86400.000001"),
+        (-1.0, 1e-9, "-1"),
+        (math.nan, 0.1, "nan"),
+        (1e200, 1.0, "1e+200"),
+    ],
+)
+def test_the_time_of_a_row_has_digits_enough_to_find_it(t, apart, said):
+    assert moment(t, apart) == said

@@ -25,6 +25,24 @@ def time_unit(seconds: Iterable[float]) -> tuple[float, str]:
     return 1e3, "ms"
 
 
+def moment(t: float, apart: float) -> str:
+    """A time in a log, which may count from 1970, with digits enough to find its row.
+
+    Args:
+        t: s.
+        apart: how far it is from the time that it must not be taken for, s; 0: there is none, and it is shown to a
+            tenth of a microsecond.
+
+    Returns:
+        Such as "1.45", or "1700000000.02": six digits, or as many as tell a tenth of `apart`.
+    """
+    for digits in range(6, 18):
+        shown = f"{t:.{digits}g}"
+        if "e+" not in shown and abs(float(shown) - t) <= 0.1 * (apart or 1e-6):
+            return shown
+    return f"{t:g}"
+
+
 def shown_time(seconds: float, digits: int = 3) -> str:
     """A time in the unit that suits it.
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.times import moment
 from twinloop._ground.writing import write_whole
 from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
 from twinloop.logs.headers import advice, listed, remarks_on, renamed
@@ -75,7 +76,7 @@ class Log:
         """
         with self.errors():
             names = (*names_of(self.states, self.signals), *self.signals.command_names)
-            _refuse_no_number(self.t, names, (self.states, self.commands))
+            _refuse_no_number(self.t, names, (self.states, self.commands), self.signals.dt)
             return Trajectory(self.t, self.states, self.commands, ended=ended, reason=reason)
 
     def errors(self) -> AbstractContextManager[None]:
@@ -209,7 +210,7 @@ def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
     write_whole(path, table.getvalue())
 
 
-def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats]) -> None:
+def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats], dt: float) -> None:
     """Names the column and the time of a value that is not finite, as a person finds it in a log."""
     if any(values.ndim != 2 or values.dtype.kind != "f" for values in parts) or t.ndim != 1:
         return  # of another shape: Trajectory says what was expected
@@ -220,8 +221,8 @@ def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats]) 
             raise AtRow(
                 f"expected a finite number for {name} in each row, found {column[rows[0]]} in",
                 int(rows[0]),
-                f", t = {t[rows[0]]:g} s ({len(rows)} such row{'s' * (len(rows) > 1)}); fill it in, or cut the log"
-                " before.",
+                f", t = {moment(t[rows[0]], dt)} s ({len(rows)} such row{'s' * (len(rows) > 1)}); fill it in, or cut"
+                " the log before.",
             )
 
 

@@ -12,6 +12,7 @@ from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import in_unit, two_digits
+from twinloop._ground.times import moment
 from twinloop.campaign.data.begun import ended_early, from_first_readings, from_other_starts
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.gains import FlownOtherwise, from_other_gains
@@ -229,7 +230,7 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
         yield serious(
             "gaps",
             f"Rows are missing in {int(lost.sum())} place{'s' * (int(lost.sum()) != 1)}, about {rows} in all, the first"
-            f" after {t[first]:g} s ({row_name(first, lines)}): split the log there, or fill in the rows.",
+            f" after {moment(t[first], dt)} s ({row_name(first, lines)}): split the log there, or fill in the rows.",
         )
     worst = float(np.abs(steps[~lost] / dt - 1.0).max(initial=0.0))
     if worst > JITTER:
@@ -270,15 +271,16 @@ def _disorder(t: Floats, steps: Floats, lines: Sequence[int] | None) -> str:
     if back.all():
         return "The rows are in reverse order, the last time first: sort them by t."
     row = int(np.argmax(back if back.any() else steps == 0.0)) + 1
+    before, after = (moment(each, float(t[row - 1] - t[row])) for each in (t[row - 1], t[row]))
     if back.any():
         return (
-            f"Time goes back at {row_name(row, lines)}, from {t[row - 1]:g} s to {t[row]:g} s: sort the rows by t, or"
+            f"Time goes back at {row_name(row, lines)}, from {before} s to {after} s: sort the rows by t, or"
             " split the log where another one begins."
         )
     count = int((steps == 0.0).sum())
     return (
         f"{count} row{' has' if count == 1 else 's have'} the time of the row before, the first at"
-        f" {row_name(row, lines)}, {t[row]:g} s: remove rows that are repeated, or write t with more digits."
+        f" {row_name(row, lines)}, {after} s: remove rows that are repeated, or write t with more digits."
     )
 
 
@@ -418,7 +420,9 @@ def _of_run(
     if any(remark.code == "period" for remark in before):
         # What is integrated or counted in periods would only repeat that these are wrong.
         return [remark for remark in suspicious([run], signals) if remark.serious]
-    runs, found = without_turns([run], signals, lambda _, row: f"at {row_name(row, lines)}, {run.t[row]:g} s")
+    runs, found = without_turns(
+        [run], signals, lambda _, row: f"at {row_name(row, lines)}, {moment(run.t[row], signals.dt)} s"
+    )
     found += [*against_derivatives(runs, signals), *suspicious(runs, signals)]
     if compared and not known and not any(remark.serious for remark in found):
         found += _of_columns(run, signals, {remark.code for remark in found})

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from twinloop._ground.texts import two_digits
+from twinloop._ground.times import moment
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.odd_one_out import Odd, said_odd
 from twinloop.campaign.data.readings import at_rest, suspicious
@@ -82,7 +83,9 @@ def diagnostics_of(
     recorded, wrapped = without_turns(
         [run.trajectory for run in experiments],
         signals,
-        lambda k, row: f"in run {k + 1} of {len(experiments)} at {experiments[k].trajectory.t[row]:g} s",
+        lambda k, row: (
+            f"in run {k + 1} of {len(experiments)} at {moment(experiments[k].trajectory.t[row], signals.dt)} s"
+        ),
     )
     odd = found.odd if found.explained and not found.misses else odd_log(experiments, signals)
     said = [
