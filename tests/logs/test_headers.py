@@ -114,6 +114,23 @@ def test_two_columns_may_be_exchanged_by_their_names(tmp_path):
     np.testing.assert_array_equal(run.states[:, [1, 0]], loaded(tmp_path, NAMES, None).states[:, :2])
 
 
+def test_a_column_that_is_mistyped_is_named_where_the_signal_is_missing_too(tmp_path):
+    header = ["Roll (rad)" if name == "roll" else name for name in NAMES]
+    with pytest.raises(tl.InvalidInput) as refusal:
+        loaded(tmp_path, header, {"roll": "Rol (rad)", "p": "gyro x"})
+    said = str(refusal.value)
+    assert (
+        "; roll ('Rol (rad)' under [log], or by `columns`) is missing: did you mean 'Roll (rad)' for roll?"
+        in said
+    )
+    header = ["gyro z [rad/s]" if name == "p" else name for name in NAMES if name != "roll"]
+    with pytest.raises(tl.InvalidInput) as refusal:
+        loaded(tmp_path, header, {"p": "gyro_z [rad/s] "})
+    said = str(refusal.value)
+    assert "; roll, p ('gyro_z [rad/s]' under [log], or by `columns`) are missing: did you mean" in said
+    assert "'gyro z [rad/s]' for p?" in said
+
+
 @pytest.mark.parametrize(
     ("columns", "said"),
     [

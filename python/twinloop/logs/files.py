@@ -18,7 +18,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.times import moment
 from twinloop._ground.writing import write_whole
 from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
-from twinloop.logs.headers import advice, listed, remarks_on, renamed
+from twinloop.logs.headers import advice, as_called, listed, remarks_on, renamed
 from twinloop.logs.missing import filled
 from twinloop.logs.table import TIME, Row, number_in, refuse_cut, refuse_longer, rows_of
 from twinloop.logs.ulog import Window, read_ulog
@@ -293,10 +293,11 @@ def _columns(
     missing = [name for name in wanted if name not in names]
     if missing:
         unused = [name for name in names if name and name not in wanted]
-        meant = advice({name: units[name] for name in missing}, unused)
+        meant = advice({name: units[name] for name in missing}, unused, columns)
         raise InvalidInput(
-            f"Log {called}: expected columns called {', '.join(wanted)}, found {listed(head)}; {', '.join(missing)}"
-            f" {'is' if len(missing) == 1 else 'are'} missing: {meant}{ELSEWHERE}"
+            f"Log {called}: expected columns called {', '.join(wanted)}, found {listed(head)};"
+            f" {', '.join(as_called(missing, columns))} {'is' if len(missing) == 1 else 'are'} missing:"
+            f" {meant}{ELSEWHERE}"
         )
     # In numbers from the first row on; the commands of a row are read once there is another one.
     found = {name: array("d") for name in wanted}

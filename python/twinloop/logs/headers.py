@@ -88,12 +88,26 @@ def remarks_on(columns: Mapping[str, str], head: Sequence[str], units: Mapping[s
             )
 
 
-def advice(missing: Mapping[str, str], unused: Sequence[str]) -> str:
+def as_called(names: Sequence[str], columns: Mapping[str, str]) -> list[str]:
+    """Names of signals whose columns are missing, with what was said that these are called: there it may be mistyped.
+
+    Args:
+        names: of the signals.
+        columns: what some signals are called in a log.
+    """
+    return [
+        f"{name} ({columns[name].strip()!r} under [log], or by `columns`)" if name in columns else name
+        for name in names
+    ]
+
+
+def advice(missing: Mapping[str, str], unused: Sequence[str], columns: Mapping[str, str]) -> str:
     """What to do about columns that are missing.
 
     Args:
         missing: unit of each name that is wanted.
         unused: columns that no signal has.
+        columns: what some signals are called in a log; one that is nearly called so is probably meant, too.
 
     Returns:
         For each name the column that is probably meant, no column twice; without any, how columns are named.
@@ -101,7 +115,7 @@ def advice(missing: Mapping[str, str], unused: Sequence[str]) -> str:
     compared = [column for column in unused if len(column) <= LONGEST][:MOST]
     pairs = sorted(
         (
-            (_likeness(name, unit, column), name, column)
+            (max(_likeness(name, unit, column), _mistyped(columns.get(name, ""), column)), name, column)
             for name, unit in missing.items()
             for column in compared
         ),
@@ -129,6 +143,11 @@ def _likeness(name: str, unit: str, column: str) -> float:
     if found.startswith(f"{name}_") and found[len(name) + 1 :] in _written(unit):
         return 1.0
     return SequenceMatcher(None, name, found).ratio()
+
+
+def _mistyped(called: str, column: str) -> float:
+    """How probable it is that a column's name was written so by mistake, unit and all."""
+    return SequenceMatcher(None, called.strip().casefold(), column.casefold()).ratio()
 
 
 def _written(unit: str) -> set[str]:
