@@ -284,6 +284,14 @@ def test_a_system_that_asks_for_signals_is_given_those_of_the_file(folder):
         ((PENDULUM, section("rig:rig", "timeot = 3.0")), "did you mean 'timeout'"),
         ((PENDULUM, section("rig:rig", "timeout = -3.0")), "above 0"),
         ((PENDULUM, section("quadrotor")), "expected its own states"),
+        (
+            (
+                PENDULUM.replace("scale = 8.0", "scale = 9.0").replace("dt = 0.05 ", "dt = 0.1 "),
+                section("rig:rig"),
+            ),
+            "found others: state rate: scale: 9.0 in the campaign file, 8.0 in the system; dt: 0.1 in the campaign"
+            " file, 0.05 in the system; correct the file",
+        ),
         ((SHORT, section("rig:rig")), "expected [task], found none"),
         (("dt = 0.1", SHORT, section("rig:rig")), "expected [states] beside dt"),
         ((PENDULUM, section("rig:rig", noise="much")), "expected a finite number"),

@@ -12,13 +12,12 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import to_type
 from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
-from twinloop.campaign.differing import differences
 from twinloop.campaign.keeping import as_begun, check_setup
 from twinloop.campaign.presets import PRESETS
 from twinloop.campaign.system_section import SystemSection, said_by, system_section
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, at, unknown
-from twinloop.records import read
+from twinloop.records import differences, read
 from twinloop.signals import Command as Channel
 from twinloop.signals import RigidBody, Signals, State
 from twinloop.systems import System

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from twinloop._ground.texts import text
-from twinloop.campaign.differing import check_same
 from twinloop.campaign.history import Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
@@ -17,7 +16,7 @@ from twinloop.campaign.provenance import provenance
 from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
-from twinloop.records import Record
+from twinloop.records import Record, check_same
 from twinloop.store import Keeper, Store, Stored, StoredAs, begun, found, listed, only_name, opened
 
 Answer = TypeVar("Answer")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from twinloop._ground.arrays import whole
-from twinloop.campaign.differing import check_same
 from twinloop.guard.guarded import record_of, unguarded
-from twinloop.records import Record
+from twinloop.records import Record, check_same
 
 
 @dataclass

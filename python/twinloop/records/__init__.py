@@ -1,5 +1,6 @@
 """The plain form of values: numbers, texts, lists and dicts that JSON holds without loss."""
 
+from twinloop.records.differing import check_same, differences
 from twinloop.records.reading import from_text
 from twinloop.records.recorded import (
     KINDS,
@@ -18,7 +19,9 @@ __all__ = [
     "Record",
     "Recorded",
     "beside",
+    "check_same",
     "checked_record",
+    "differences",
     "from_text",
     "plain",
     "read",

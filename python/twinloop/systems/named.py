@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from twinloop.errors import InvalidInput, TwinloopError, unknown
+from twinloop.records import differences
 from twinloop.signals import Signals
 from twinloop.systems.base import System
 from twinloop.systems.fmu import FMU
@@ -59,9 +60,10 @@ def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | 
             f" {type(system).__name__}; add them."
         )
     if signals is not None and own.to_record() != signals.to_record():
+        differ = differences(signals.to_record(), own.to_record(), ("in the campaign file", "in the system"))
         raise InvalidInput(
-            f"System {name!r}: expected its own states, commands and dt to be those of the campaign file, found others;"
-            " correct the file, or leave [states], [commands] and dt out of it."
+            f"System {name!r}: expected its own states, commands and dt to be those of the campaign file, found others:"
+            f" {differ}; correct the file, or leave [states], [commands] and dt out of it."
         )
     made: System = system
     return made

@@ -12,19 +12,22 @@ LONGEST = 60
 MOST = 3
 """Differences that are shown."""
 ABSENT = object()
+SINCE = "in the store", "now"
+"""Where the two are that are compared, unless it is said."""
 
 
-def differences(known: object, asked: object) -> str:
+def differences(known: object, asked: object, where: tuple[str, str] = SINCE) -> str:
     """What differs between what a store holds and what is asked for now; empty where nothing does.
 
     Args:
         known: plain form of what the store holds.
         asked: the same of what is asked for.
+        where: in words, where the one and the other are.
 
     Returns:
         Such as "signals: state p: derivative_of: 'roll' in the store, none now".
     """
-    found = list(_found(known, asked, ()))
+    found = list(_found(known, asked, (), where))
     more = f"; and {len(found) - MOST} more" if len(found) > MOST else ""
     return "; ".join(found[:MOST]) + more
 
@@ -47,20 +50,20 @@ def check_same(known: object, asked: object, what: str) -> None:
         )
 
 
-def _found(known: Any, asked: Any, place: tuple[str, ...]) -> Iterator[str]:
+def _found(known: Any, asked: Any, place: tuple[str, ...], where: tuple[str, str]) -> Iterator[str]:
     if known == asked:
         return
     if isinstance(known, Mapping) and isinstance(asked, Mapping):
         for key in dict.fromkeys([*known, *asked]):
-            yield from _found(known.get(key, ABSENT), asked.get(key, ABSENT), (*place, str(key)))
+            yield from _found(known.get(key, ABSENT), asked.get(key, ABSENT), (*place, str(key)), where)
     elif _named(known) and _named(asked):
-        yield from _of_members(known, asked, place)
+        yield from _of_members(known, asked, place, where)
     elif isinstance(known, (list, tuple)) and isinstance(asked, (list, tuple)) and len(known) == len(asked):
         for i, (one, other) in enumerate(zip(known, asked, strict=True)):
-            yield from _found(one, other, (*place, str(i + 1)))
+            yield from _found(one, other, (*place, str(i + 1)), where)
     else:
         one, other = _cut(_words(known), _words(asked))
-        yield f"{': '.join(place)}: {one} in the store, {other} now"
+        yield f"{': '.join(place)}: {one} {where[0]}, {other} {where[1]}"
 
 
 def _named(value: object) -> bool:
@@ -71,19 +74,23 @@ def _named(value: object) -> bool:
 
 
 def _of_members(
-    known: Sequence[Mapping[str, Any]], asked: Sequence[Mapping[str, Any]], place: tuple[str, ...]
+    known: Sequence[Mapping[str, Any]],
+    asked: Sequence[Mapping[str, Any]],
+    place: tuple[str, ...],
+    where: tuple[str, str],
 ) -> Iterator[str]:
     """Differences of the members by name; of their order where they are the same ones."""
     ours, theirs = ({item["name"]: item for item in items} for items in (known, asked))
     for name in dict.fromkeys([*ours, *theirs]):
         item = ours[name] if name in ours else theirs[name]
-        where = (*place[:-1], f"{item['kind']} {name}")
+        member = (*place[:-1], f"{item['kind']} {name}")
         if name in ours and name in theirs:
-            yield from _found(ours[name], theirs[name], where)
+            yield from _found(ours[name], theirs[name], member, where)
         else:
-            yield f"{': '.join(where)}: {'in the store, none now' if name in ours else 'none in the store, there now'}"
+            one, other = ("", "none ") if name in ours else ("none ", "there ")
+            yield f"{': '.join(member)}: {one}{where[0]}, {other}{where[1]}"
     if list(ours) != list(theirs) and set(ours) == set(theirs):
-        yield f"{': '.join(place)}: in the order {', '.join(ours)} in the store, {', '.join(theirs)} now"
+        yield f"{': '.join(place)}: in the order {', '.join(ours)} {where[0]}, {', '.join(theirs)} {where[1]}"
 
 
 def _words(value: object) -> str:

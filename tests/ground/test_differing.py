@@ -1,7 +1,7 @@
 """What differs between a store and what is asked for, in words."""
 
 import twinloop as tl
-from twinloop.campaign.differing import differences
+from twinloop.records.differing import differences
 
 NAMES = ("roll", "pitch", "yaw", "p", "q", "r")
 BODY = tl.RigidBody(NAMES[:3], NAMES[3:])
@@ -42,6 +42,15 @@ def test_states_that_are_missing_or_in_another_order_are_named():
     assert differences(record(), record(NAMES[:5])) == "signals: state r: in the store, none now"
     said = differences(record(), record(NAMES[::-1]))
     assert said.startswith("signals: states: in the order roll, pitch")
+
+
+def test_where_the_two_are_is_said_in_the_words_that_are_asked_for():
+    file, system = record(NAMES[:5]), record(NAMES[:4], of={"p": "roll"})
+    said = differences(file, system, ("in the file", "in the system"))
+    assert "state p: derivative_of: none in the file, 'roll' in the system" in said
+    assert "state q: in the file, none in the system" in said
+    said = differences(system, file, ("in the system", "in the file"))
+    assert "state q: none in the system, there in the file" in said
 
 
 def test_long_values_are_shown_from_where_they_differ():
