@@ -3,6 +3,7 @@
 import csv
 import json
 import shlex
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -73,6 +74,34 @@ def test_a_campaign_is_flown_by_hand_as_from_python(folder):
         tests.append(other.ask()) if number < 2 else None
     assert same(*([run.trajectory.states for run in c.experiments] for c in (by_hand, other)))
     assert same([t.genes for t in by_hand.tests], [t.genes for t in other.tests])
+
+
+def test_show_lists_the_tests_whose_flight_is_awaited(folder):
+    def waiting():
+        listed = json.loads(run("show", "rig.db", "--json").stdout)["store"]["waiting"]
+        numbers = ", ".join(map(str, listed))
+        said = f"Test{'s' * (len(listed) > 1)} waiting to be flown: {numbers}.\n" if listed else "waiting"
+        assert (said in run("show", "rig.db").stdout) == bool(listed)
+        return listed
+
+    run("ask", "rig.db")
+    assert waiting() == [0]
+    flown(look().tests[0])
+    run("tell", "rig.db", "0", "flight.csv")
+    assert waiting() == []
+    # Somebody's own test, to look at.
+    with closing(tl.Campaign.load("rig.db")) as campaign:
+        own = campaign.test({name: 1.1 * value for name, value in campaign.tests[0].parameters.items()})
+        assert own.number == 1
+    assert waiting() == []
+    run("ask", "rig.db")
+    assert waiting() == [2]
+    run("abandon", "rig.db", "2")
+    assert waiting() == []
+    run("withdraw", "rig.db", "0", "--reason", "another rig")
+    assert 0 in waiting()
+    run("abandon", "rig.db", "0")
+    assert 0 not in waiting()
 
 
 def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):

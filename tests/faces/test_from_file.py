@@ -189,6 +189,7 @@ def test_a_rig_whose_code_raises_in_its_first_flight_leaves_a_sentence_and_no_tr
     stopped = run("run", "rig.toml")
     assert stopped.exit_code == 1 and stopped.stdout == "" and isinstance(stopped.exception, SystemExit)
     assert "found FileNotFoundError in raises.py, line 9" in stopped.stderr
+    assert "Test waiting to be flown: 0." in run("show", "rig.db").stdout
 
 
 FAILS = """

@@ -20,7 +20,7 @@ from twinloop.faces.from_file import beside, run_file
 from twinloop.faces.opening import say_if_changed
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
-from twinloop.faces.telling import counted
+from twinloop.faces.telling import awaited, counted
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.withdrawing import named
@@ -173,7 +173,7 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
         "told": len(campaign.experiments),
         "learnt": len(campaign.history[-1].tests) if campaign.history else 0,
         "experiments": held.experiments,
-        "waiting": [test.number for test in campaign.waiting],
+        "waiting": [test.number for test in awaited(campaign)],
         "failed": [failure.test.number for failure in campaign.failures],
         "abandoned": [test.number for test in campaign.tests if campaign.status(test) == "abandoned"],
         "withdrawn": [

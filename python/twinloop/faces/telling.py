@@ -186,6 +186,20 @@ def to_be_flown(campaign: Campaign) -> list[Test]:
     return [test for test in campaign.tests if campaign.status(test) == "asked"]
 
 
+def awaited(campaign: Campaign) -> list[Test]:
+    """Those of the tests to be flown of which a flight is awaited.
+
+    Of somebody's own ones these are the first test, as long as none was flown, and a test whose run was withdrawn;
+    another one may have been made only to see what the twin predicts.
+
+    Args:
+        campaign: of them.
+    """
+    begun = any(not run.attached for run in campaign.experiments)
+    wanted = {test.number for test in campaign.waiting} | {each.test for each in campaign.withdrawals}
+    return [test for test in to_be_flown(campaign) if not begun or test.number in wanted]
+
+
 def is_chosen(campaign: Campaign, test: Test) -> bool:
     """Whether the campaign chose a test, by `ask`; otherwise it is a person's own.
 
