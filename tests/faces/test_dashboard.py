@@ -231,9 +231,12 @@ def test_a_flight_that_was_recorded_by_mistake_is_withdrawn_and_its_test_waits_a
         assert call(address, "POST", "/c/1/log?file=other.csv", other)[0] == 200
         shown = json.loads(call(address, "GET", "/c/1/tests")[2])["recorded"]
         assert [each["which"] for each in shown] == ["0", "attached-1"]
-        assert [each["words"] for each in shown] == ["the flight of test 0", "attached flight 1 (20 steps)"]
+        assert [each["words"] for each in shown] == [
+            "the flight of test 0",
+            "attached flight 1 (other.csv, 20 steps)",
+        ]
         status, _, said = call(address, "POST", "/c/1/flights/attached-1/withdraw", wrong)
-        assert status == 200 and "attached flight 1 (20 steps). 1 experiment left." in said
+        assert status == 200 and "attached flight 1 (other.csv, 20 steps). 1 experiment left." in said
         status, _, said = call(address, "POST", "/c/1/flights/0/withdraw", wrong)
         assert status == 200 and "Test 1 abandoned: planned with it." in said
         shown = json.loads(call(address, "GET", "/c/1/tests")[2])

@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import closing
 
 import pytest
 from click.testing import CliRunner
@@ -11,6 +12,7 @@ from conftest import pendulum_step
 from lives import SIGNALS, SMALL, by_hand
 from twinloop.campaign.campaign_file import _toml, template
 from twinloop.faces.cli import main
+from twinloop.faces.withdrawing import recorded
 from twinloop.logs import write_columns
 
 
@@ -82,6 +84,20 @@ def test_an_attached_flight_is_withdrawn_by_its_log_or_its_place(flights, which)
     assert [run.number for run in look().experiments] == [0]
 
 
+def test_the_answer_names_the_log_that_was_withdrawn_where_it_is_known(flights):
+    with closing(tl.Campaign.load("rig.db")) as campaign:
+        campaign.attach(by_hand(25))
+    assert list(recorded(look()).values()) == [
+        "the flight of test 0", "attached flight 2 (25 steps)", "attached flight 1 (old.csv, 30 steps)",
+    ]  # fmt: skip
+    assert "Saved: the attached log old.csv withdrawn; 2 experiments" in withdrawn("attached-1").stdout
+    assert "Saved: an attached flight withdrawn; 1 experiment" in withdrawn("attached-1").stdout
+    assert withdrawn("0").exit_code == 0
+    assert look().withdrawn_logs == ("old.csv", "", "")
+    shown = run("show", "rig.db").stdout
+    assert ": an attached flight (columns exchanged)." in shown and ": the flight of test 0 (" in shown
+
+
 @pytest.mark.parametrize(
     ("which", "taken", "left"),
     [
@@ -108,21 +124,22 @@ def test_a_flight_that_is_the_beginning_of_another_record_is_noticed_and_withdra
 def test_show_says_what_was_withdrawn_when_and_why(flights):
     withdrawn("attached-1")
     shown = run("show", "rig.db").stdout
-    assert ": an attached flight (columns exchanged)." in shown and "Withdrawn at 20" in shown
+    assert ": the attached log old.csv (columns exchanged)." in shown and "Withdrawn at 20" in shown
     assert run("learn", "rig.db").exit_code == 0
-    assert "An attached flight was withdrawn: columns exchanged." in run("show", "rig.db").stdout
+    assert "The attached log old.csv was withdrawn: columns exchanged." in run("show", "rig.db").stdout
     facts = json.loads(run("show", "rig.db", "--json").stdout)
     assert facts["store"]["withdrawn"][0]["reason"] == "columns exchanged"
     assert facts["result"]["cost"]["withdrawn"] == 1
+    assert facts["result"]["withdrawn"] == [{"test": None, "reason": "columns exchanged", "log": "old.csv"}]
     assert run("report", "rig.db", "-o", "rig.html").exit_code == 0
-    assert "<li>An attached flight: columns exchanged</li>" in (flights / "rig.html").read_text("utf-8")
+    assert "<li>The attached log old.csv: columns exchanged</li>" in (flights / "rig.html").read_text("utf-8")
 
 
 @pytest.mark.parametrize(
     ("which", "sentence"),
     [
         ("7", "number of a test with a recorded flight, one of 0, found 7"),
-        ("attached-2", r"or attached-1 \(30 steps\), found attached-2"),
+        ("attached-2", r"or attached-1 \(old.csv, 30 steps\), found attached-2"),
         ("other.csv", "found other.csv"),
         ("flight1.csv", "found flight1.csv"),
     ],

@@ -682,6 +682,13 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return tuple(self._book.withdrawals)
 
     @property
+    def withdrawn_logs(self) -> tuple[str, ...]:
+        """Of each of `withdrawals`, what the log of the attached run is called; empty where nobody has said so."""
+        return tuple(
+            "" if each.run is None else self._book.recorded[each.run].log for each in self.withdrawals
+        )
+
+    @property
     def rmse(self) -> Floats:
         """Root mean square of flown minus simulated over all flights, each from where it began (n_x,), in each unit."""
         return rmse(self.twin, self._book.experiments)

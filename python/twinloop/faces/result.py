@@ -95,7 +95,10 @@ def summary(
             {"test": failure.test.number, "gains": failure.test.parameters, "reason": failure.reason}
             for failure in campaign.failures
         ],
-        "withdrawn": [{"test": each.test, "reason": each.reason} for each in campaign.withdrawals],
+        "withdrawn": [
+            {"test": each.test, "reason": each.reason, "log": log or None}
+            for each, log in zip(campaign.withdrawals, campaign.withdrawn_logs, strict=True)
+        ],
         "cost": _cost(campaign.cost),
         "controller": None if best is None else _controller(campaign, best, found, identified),
         "no_controller": found.no_controller or None,

@@ -177,8 +177,10 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
         "failed": [failure.test.number for failure in campaign.failures],
         "abandoned": [test.number for test in campaign.tests if campaign.status(test) == "abandoned"],
         "withdrawn": [
-            {"test": each.test, "what": named(each), "reason": each.reason, "at": at}
-            for each, at in zip(campaign.withdrawals, held.withdrawn_at, strict=False)
+            {"test": each.test, "what": named(each, log), "reason": each.reason, "at": at}
+            for each, log, at in zip(
+                campaign.withdrawals, campaign.withdrawn_logs, held.withdrawn_at, strict=False
+            )
         ],
         "sessions": list(held.sessions),
     }

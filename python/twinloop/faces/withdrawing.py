@@ -49,9 +49,9 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
             "test": test, "reason": reason, "abandoned": given_up(campaign), "experiments": len(campaign.experiments),
         }  # fmt: skip
         which_one = _which(campaign, before) if others else ""
+        what = named(campaign.withdrawals[-1], campaign.withdrawn_logs[-1])
         lines = [
-            f"Saved: {named(campaign.withdrawals[-1])}{which_one} withdrawn; {counted(campaign)} in"
-            f" {shown_name(store)}.",
+            f"Saved: {what}{which_one} withdrawn; {counted(campaign)} in {shown_name(store)}.",
             *given_up_words(campaign),
         ]
         if others or failures:
@@ -111,14 +111,15 @@ def _described(run: Experiment) -> str:
     return f"{found.steps} steps, {found.ended}{f': {found.reason}' if found.reason else ''}"
 
 
-def named(withdrawal: Withdrawal) -> str:
+def named(withdrawal: Withdrawal, log: str) -> str:
     """What was withdrawn, in words.
 
     Args:
         withdrawal: the entry of it.
+        log: what the log of an attached flight is called; empty where nobody has said so.
     """
     if withdrawal.test is None:
-        return "an attached flight"
+        return f"the attached log {log}" if log else "an attached flight"
     what = (
         "flight" if withdrawal.failure is None else "failure" if withdrawal.run is None else "failed flight"
     )
@@ -138,8 +139,7 @@ def recorded(campaign: Campaign) -> dict[str, str]:
         if campaign.status(test) in ("flown", "aborted", "failed")
     }
     flights = {
-        name: f"{name.replace('-', ' flight ')} ({run.replayed.steps} steps)"
-        for name, run in _attached(campaign).items()
+        name: f"{name.replace('-', ' flight ')} ({_log(run)})" for name, run in _attached(campaign).items()
     }
     return dict(reversed({**flights, **tests}.items()))
 
@@ -181,4 +181,9 @@ def _attached_name(place: int) -> str:
 def _names(attached: Mapping[str, Experiment]) -> str:
     if not attached:
         return "attached-N for an attached flight (there is none)"
-    return ", ".join(f"{name} ({run.replayed.steps} steps)" for name, run in attached.items())
+    return ", ".join(f"{name} ({_log(run)})" for name, run in attached.items())
+
+
+def _log(run: Experiment) -> str:
+    """What the log of an attached flight is called, if somebody has said so, and its length."""
+    return f"{f'{run.log}, ' if run.log else ''}{run.replayed.steps} steps"

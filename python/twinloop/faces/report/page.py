@@ -124,7 +124,7 @@ def report_page(
         risk=partial(risk_words, bounded=is_bounded(found.signals)),
         spread=shown_spread,
         failures=campaign.failures,
-        withdrawals=campaign.withdrawals,
+        withdrawals=result["withdrawn"],
         sessions=sessions,
         version=_core.__version__,
     )  # fmt: skip

@@ -125,7 +125,9 @@ def _of_run(run: Mapping[str, Any]) -> str:
 
 
 def _withdrawn(flight: Mapping[str, Any]) -> str:
-    of = "An attached flight" if flight["test"] is None else f"A flight of test {flight['test']}"
+    of = f"A flight of test {flight['test']}"
+    if flight["test"] is None:
+        of = f"The attached log {flight['log']}" if flight.get("log") else "An attached flight"
     return f"{of} was withdrawn: {flight['reason']}."
 
 
