@@ -42,6 +42,7 @@ from twinloop.campaign import keeping
 from twinloop.records import to_text
 from twinloop.records.reading import MOST_ITEMS
 from twinloop.store import Keeper, doing, found, listed, opened, state
+from twinloop.store.schema import REVISION
 
 
 def rows(path, table):
@@ -740,6 +741,20 @@ def test_a_store_of_a_newer_version_is_refused(path, pendulum):
     for call in (stored, tl.Campaign.load, lambda where: tl.Campaign.load(where, read_only=True)):
         with pytest.raises(tl.InvalidInput, match="newer Twinloop"):
             call(path)
+
+
+def test_a_store_whose_version_is_damaged_is_called_so_and_no_newer_one(path, pendulum):
+    flown(stored(path), pendulum).close()
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("pragma wal_checkpoint(truncate)")
+    before, _, after = path.read_bytes().partition(
+        REVISION.encode()
+    )  # in its table, which comes before its index
+    path.write_bytes(before + b"0904" + after)
+    for read_only in (True, False):
+        with pytest.raises(tl.InvalidInput, match="found a damaged one") as refused:
+            tl.Campaign.load(path, read_only=read_only)
+        assert "newer" not in str(refused.value)
 
 
 COLUMNS = {

@@ -241,9 +241,10 @@ def _connected(text: str, path: Path | None, read_only: bool, immutable: bool = 
     return Store(engine, str(path), path, read_only)
 
 
-def _check_whole(store: Store) -> None:
+def _check_whole(store: Store, check: str = "quick_check") -> None:
+    """Refuses a file that SQLite finds damaged; `integrity_check` also compares each table with its indices."""
     with store.engine.connect() as connection:
-        answer = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
+        answer = connection.exec_driver_sql(f"PRAGMA {check}(1)").scalar()
     if answer != "ok":
         raise InvalidInput(
             f"Store {store.name}: expected a whole database, found a damaged one ({str(answer)[:100]}); nothing"
@@ -304,6 +305,9 @@ def _migrate(store: Store, found: str | None) -> None:
     config.set_main_option("script_location", str(Path(__file__).with_name("migrations")))
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
     if found is not None and found not in known:
+        if store.path is not None:
+            # A version may be unknown because its digits are damaged: it stands in an index, too.
+            _check_whole(store, "integrity_check")
         raise InvalidInput(
             f"Store {store.name}: expected tables of version {max(known)} at most, found {found}; a newer Twinloop"
             " wrote it: install that."
