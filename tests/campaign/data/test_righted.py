@@ -122,3 +122,18 @@ def test_of_what_no_change_of_a_column_explains_none_is_named():
     stream = np.random.default_rng(3)
     (sentence,) = said(recorded(commands=stream.uniform(0.0, 100.0, COMMANDS.shape)))
     assert "They would be" not in sentence
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"), [(1, "the first row left out"), (12, "the first 12 rows left out")]
+)
+def test_a_log_that_began_before_the_flight_is_said_to(rows, words):
+    stream = np.random.default_rng(1)
+    rest = STATES[0] + 0.05 * stream.normal(size=(rows, 2))
+    states, commands = np.vstack([rest, STATES])[: len(STATES)], np.vstack([np.zeros((rows, 2)), COMMANDS])
+    wrong = recorded(states, commands[: len(COMMANDS)])
+    assert change_that_rights(wrong) == words
+    if other_commands([wrong]):
+        (sentence,) = said(wrong)
+        assert f"They would be with {words}." in sentence
+    assert other_commands([wrong]) == [0] or rows == 1

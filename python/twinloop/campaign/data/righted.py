@@ -90,6 +90,18 @@ def crossed(test: Test, run: Trajectory) -> Iterator[Change]:
         yield with_state(test, run, i, j)
 
 
+def begun_later(test: Test, run: Trajectory) -> Iterator[Change]:
+    """The log without its first rows, of which half are left at least: it may have begun before the flight did.
+
+    Args:
+        test: that the run is told as a flight of.
+        run: that was recorded.
+    """
+    for rows in range(1, run.steps // 2 + 1):
+        words = f"the first {rows} rows left out" if rows > 1 else "the first row left out"
+        yield Change(words, run.states[rows:], run.commands[rows:])
+
+
 def with_state(test: Test, run: Trajectory, state: int, command: int) -> Change:
     """A command exchanged with a state.
 

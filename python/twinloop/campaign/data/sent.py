@@ -11,6 +11,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.data.righted import (
     LITTLE,
     Change,
+    begun_later,
     crossed,
     exchanged_states,
     nearest,
@@ -82,9 +83,9 @@ def exchanged_with_state(run: Experiment) -> tuple[str, str] | None:
 
 
 def change_that_rights(run: Experiment) -> str:
-    """What of a log's columns has to be changed so that its commands are those of the test's controller.
+    """What of a log has to be changed so that its commands are those of the test's controller.
 
-    Of exchanged columns, signs and units that explain the commands it is the one that does so best.
+    Of exchanged columns, signs, units and first rows that explain the commands it is the one that does so best.
 
     Args:
         run: of a test.
@@ -95,7 +96,7 @@ def change_that_rights(run: Experiment) -> str:
     if run.test is None:
         return ""
     test, flight = run.test, run.trajectory
-    kinds = (crossed, exchanged_states, other_signs, other_units)
+    kinds = (crossed, exchanged_states, other_signs, other_units, begun_later)
     words = nearest(test, flight, chain.from_iterable(kind(test, flight) for kind in kinds))
     if words:
         return words
