@@ -111,6 +111,16 @@ def test_where_the_records_show_no_wrong_sign_none_is_looked_for():
     assert "check their units and signs" in wrong[0] and "contact" not in wrong[1]
 
 
+def test_where_no_rate_is_logged_and_no_law_follows_it_is_said_what_to_log():
+    alone = tl.Signals([tl.State("angle", "rad", 1.0)], SIGNALS.commands, DT)
+    run = flown()
+    run.trajectory = tl.Trajectory(run.trajectory.t, run.trajectory.states[:, 1:2], run.trajectory.commands)
+    for found in (Findings(False), Findings(True, misses=[Miss(0, 1, 0.2, 4.5, False)])):
+        (remark,) = diagnostics_of([run], alone, STEPS, found)
+        assert "No rate of angle is logged" in remark.sentence and "lags=1" in remark.sentence
+    assert "lags=1" not in said(flown(), follows=False)[0]
+
+
 def remarked(*runs, **found):
     return [
         (remark.code, remark.serious)

@@ -100,7 +100,7 @@ def diagnostics_of(
     said += _in_pieces(experiments, found.pieces, signals.dt)
     if not found.follows:
         explained = found.unanswered or bool(found.late) or any(remark.serious for remark in said)
-        said += _does_not_follow(explained, found.without_test, found.disturbed)
+        said += _does_not_follow(explained, found.without_test, found.disturbed, signals)
     else:
         said += _free_run(found.misses, len(experiments), signals) if found.misses else ()
         said += _elsewhere(found.elsewhere)
@@ -129,7 +129,19 @@ def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
         )
 
 
-def _does_not_follow(explained: bool, without_test: bool, disturbed: Sequence[str]) -> Iterator[Remark]:
+def _outputs_alone(signals: Signals) -> str:
+    """What to do where a law of all states is none, and nothing says how fast any of them changes; empty elsewhere."""
+    if len(signals.without_rates) < signals.n_x:
+        return ""
+    return (
+        f" No rate of {', '.join(signals.state_names)} is logged: log what else moves, such as a content that fills, or"
+        " declare lags=1 in the signals, which makes rates of past readings."
+    )
+
+
+def _does_not_follow(
+    explained: bool, without_test: bool, disturbed: Sequence[str], signals: Signals
+) -> Iterator[Remark]:
     """That the twin does not follow its own flights, and why, where no remark before has explained it."""
     replayed = (
         "those that it leaves have no test, so their recorded commands are replayed, and no controller corrects the"
@@ -154,9 +166,10 @@ def _does_not_follow(explained: bool, without_test: bool, disturbed: Sequence[st
             "there is an effect that no term describes, such as a contact, backlash, stiction or an unmeasured state;"
             " or the records have a fault that their checks do not show"
         )
+    more = "" if explained else _outputs_alone(signals)
     yield serious(
         "does-not-follow",
-        f"In free run the twin does not follow the runs that it was learnt from: {cause}.",
+        f"In free run the twin does not follow the runs that it was learnt from: {cause}.{more}",
     )
 
 
@@ -271,6 +284,7 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
         " tell. Until then trust it only to that accuracy."
         if all(miss.undecided for miss in misses)
         else "There is an effect that no term describes. Do not trust the twin outside these flights."
+        + _outputs_alone(signals)
     )
     yield serious(
         FREE_RUN,
