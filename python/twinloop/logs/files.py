@@ -299,21 +299,29 @@ def _columns(
             f" {', '.join(as_called(missing, columns))} {'is' if len(missing) == 1 else 'are'} missing:"
             f" {meant}{ELSEWHERE}"
         )
-    # In numbers from the first row on; the commands of a row are read once there is another one.
+    # In numbers from the first row on; the commands of a row are read once there is another one. Of several columns
+    # with something else in them the first one is said.
     found = {name: array("d") for name in wanted}
+    wrong = dict[str, InvalidInput]()
     places = {name: names.index(name) for name in wanted}
     lines = array("q")
     before: Row | None = None
     for row in rows:
         refuse_longer(row, len(names), called)
         refuse_cut(row, names, (TIME, *states_read), called)
-        for name in (TIME, *states_read):
-            found[name].append(number_in(row, places[name], name, called, name in states_read))
+        read = [(row, name) for name in (TIME, *states_read)]
         if before is not None:
-            for name in signals.command_names:
-                found[name].append(number_in(before, places[name], name, called, False))
+            read += [(before, name) for name in signals.command_names]
+        for of, name in read:
+            try:
+                found[name].append(number_in(of, places[name], name, called, name in states_read))
+            except InvalidInput as refusal:
+                wrong.setdefault(name, refusal)
         lines.append(row.line)
         before = row
+    for name in wanted:
+        if name in wrong:
+            raise wrong[name]
 
     def matrix(wanted: Sequence[str], rows: int) -> Floats:
         return np.array([found[name] for name in wanted], dtype=float).reshape(len(wanted), rows).T
