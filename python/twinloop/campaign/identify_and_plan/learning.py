@@ -137,11 +137,11 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, told.answered)
-        doubted = self._doubted(answer, told)
+        doubted, learnt_of = self._doubted(answer, told), book.experiments
         if doubted and self.options.inside:
             found = self._inside(book.experiments, earlier)
             if found is not None:
-                told, answer, begun = found
+                (told, answer, begun), learnt_of = found, inside(book.experiments)
                 doubted = self._doubted(answer, told)
         if earlier is not None:
             again = cache(partial(self._known_again, told, earlier, begun))
@@ -157,7 +157,7 @@ class Learner:
             answer, two = self._of_two(answer, told.answered(rough, number=2), two, told)
         if asked is not None and self.options.earlier_twin and not answer.explained:
             answer = or_foretold(answer, asked.identified, asked.experiments, told.answered)
-        odd = self._contradicting(answer, book.experiments)
+        odd = self._contradicting(answer, learnt_of)
         identified = answer.identified
         model = None if earlier is None else earlier.model
         lesson = lesson_of(
