@@ -480,7 +480,7 @@ def test_a_hidden_state_has_an_equation_that_sympy_reads():
 
 @pytest.mark.parametrize(
     ("late", "words"),
-    [((0,), "it knows u as sent, not as it acts"), ((0, 1), "u, t1 as sent, not as they act")],
+    [((0,), "hidden: knows u as sent, not as it acts"), ((0, 1), "u, t1 as sent, not as they act")],
 )
 def test_a_hidden_state_that_commands_fill_by_themselves_is_said_to_know_them_as_sent(late, words):
     program = parsed(5, 1, 6, ["r5 = r4 * 2.0"])

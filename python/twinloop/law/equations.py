@@ -128,7 +128,7 @@ class Equations:
                 f"±: standard deviation of a constant over the {len(self.members)} models of the committee, or"
                 " over as many of them as have the term, where a number of them is given"
             )
-        lines += self._actuators() + self._offsets()
+        lines += self._actuators() + self._as_sent() + self._offsets()
         lines += levels_in_words(self.law.levels, self.signals) + reports_in_words(
             self.law.reports, self.signals
         )
@@ -173,6 +173,18 @@ class Equations:
             start = "the first command" if rest is None else self.writer.number(rest)
             names = ", ".join(self.signals.command_names[place] for place in places)
             lines.append(f"{names}: act with {' and '.join(parts)}, from {start} at the start")
+        return lines
+
+    def _as_sent(self) -> list[str]:
+        """Hidden states that know commands before what the lines above say of how these act."""
+        lines = []
+        for symbol, hidden in zip(self.law.hidden_symbols, self.law.actuation.hidden, strict=True):
+            late = [place for place in hidden.commands if not self.law.actuation.actuators[place].direct]
+            if late and not hidden.integrated:
+                names = ", ".join(self.signals.command_names[place] for place in late)
+                lines.append(
+                    f"{symbol}: knows {names} as sent, not as {'they act' if len(late) > 1 else 'it acts'}"
+                )
         return lines
 
     def _deviation(self, values: Sequence[float]) -> str:
@@ -251,8 +263,6 @@ class Equations:
             start += f"; {rest}: the terms before it in the first period"
         else:
             rest = self.writer.number(hidden.rest)
-        if not hidden.integrated and (late := self._not_direct(hidden.commands)):
-            start += f"; it knows {late} as sent, not as {'they act' if ',' in late else 'it acts'}"
         times = [member.actuation.hidden[number].time for member in self.members if self._alike(member)]
         deviation = self._deviation(times)
         note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
@@ -265,11 +275,6 @@ class Equations:
             other = self.law.hidden_symbols[partner]
             terms.append(("-" if partner > number else "+", f"{other}/{self.writer.number(hidden.turns)}"))
         return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
-
-    def _not_direct(self, commands: Sequence[int]) -> str:
-        """Names of commands that act otherwise than they are sent."""
-        late = (place for place in commands if not self.law.actuation.actuators[place].direct)
-        return ", ".join(self.signals.command_names[place] for place in late)
 
     def _behind_a_gap(self, number: int, driven: list[tuple[str, str]], deviation: str) -> list[str]:
         """The equations of a mass behind a gap: what presses on it, or its rate."""
