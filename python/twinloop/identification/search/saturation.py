@@ -99,7 +99,7 @@ def _over_one_of(
 
 
 def _alone(problem: Problem, signals: Signals) -> list[Denominator]:
-    """X and x² of states that are neither angles nor rates, and stay away from 0; where they are few."""
+    """States alone, and their squares, that are neither angles nor rates and stay away from 0; where they are few."""
     every = [
         each
         for i in distances(signals)

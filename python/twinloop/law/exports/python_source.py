@@ -302,7 +302,7 @@ def joined(terms: Sequence[Term], between: str) -> str:
 
 
 def free_symbols(symbols: Sequence[str], taken: Collection[str]) -> list[str]:
-    """Names of variables, those that are taken, or begin as names of the export's own do, with a tail.
+    """Names of variables, other ones for those that are taken, or begin as names of the export's own do.
 
     Args:
         symbols: of a law.
