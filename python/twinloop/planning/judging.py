@@ -56,7 +56,7 @@ class Committee:
         gusts: disturbances that are known; None: nothing disturbs.
         foretells: whether what it foretold last came true.
         ending: the best one where what states do ends where flights have been; None where that is not asked.
-        gains_count: whether gains that can be tuned make a difference on the members.
+        gains_count: whether gains that can be tuned make a difference on the best one.
         lawless: states that move, of which no law is known.
         untunable: numbers of the gains that cannot be tuned for that.
     """

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from twinloop.campaign.identify_and_plan.calibration import calibrated, held_to
+from twinloop.campaign.identify_and_plan.calibration import beside_misses, calibrated, held_to
 from twinloop.planning.judging import expected
 
 
@@ -44,6 +44,31 @@ def test_before_any_prediction_was_flown_a_spread_is_what_second_flights_miss_by
     missed = [flight(1.1, 1.0)]
     assert calibrated(1e-6, 3.0, missed, misses_own=True) == calibrated(1e-6, 3.0, missed)
     assert held_to(3.0, calibrated(1e-6, 3.0, missed)) == calibrated(1e-6, 3.0, missed)
+
+
+def asked(quality):
+    """A flight of the user's own controller: nothing was predicted of it."""
+    return SimpleNamespace(test=SimpleNamespace(predicted=None), quality=quality, off_start=())
+
+
+def test_a_promise_is_as_uncertain_as_earlier_promises_were_though_what_had_flown_flew_again_as_predicted():
+    again = [flight(8.02, 8.0), flight(7.99, 8.0)]
+    # One of 5 missed by 1, one of 3 by 0.5; the next is one of 1.
+    found = calibrated(1e-6, 2.5, [asked(10.0), flight(5.0, 6.0), flight(3.0, 3.5), flight(3.51, 3.5)])
+    assert found == pytest.approx(2.0 * (1.0 / 5.0 * 0.5 / 3.0) ** 0.5 * 1.0)
+    # Most of one did not come: the next one may not come at all.
+    broken = [asked(10.0), flight(2.0, 8.0), *again]
+    assert 2.0 * calibrated(1e-6, 5.0, broken) == pytest.approx(8.0 - 5.0)
+    assert beside_misses(1e-6, 5.0, broken) < 0.02 * 5.0
+    # That gains fly as they have flown is no promise.
+    assert calibrated(1e-6, 8.0, broken) < 0.01 * 8.0
+
+
+def test_where_only_what_had_flown_was_foretold_a_promise_has_the_spread_of_a_first_prediction():
+    known = [asked(10.0), flight(10.01, 10.0), flight(9.99, 10.0)]
+    assert calibrated(1e-6, 5.0, known) == calibrated(1e-6, 5.0, [])
+    assert calibrated(1e-6, 5.0, known, misses_own=True) == calibrated(1e-6, 5.0, [], misses_own=True)
+    assert calibrated(1e-6, 9.95, known) < 0.005 * 10.0
 
 
 def test_flights_without_a_prediction_or_a_quality_tell_nothing_of_it():

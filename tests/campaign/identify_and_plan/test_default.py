@@ -415,6 +415,22 @@ def test_where_gains_make_no_difference_on_the_twin_the_best_ones_fly_again_held
     assert told(begin(), pendulum).ask().hold_back is None
 
 
+def test_gains_are_not_tuned_on_lesser_models_where_nothing_that_is_commanded_moves_the_best_one(
+    begin, pendulum
+):
+    asked, counted = [], method_of_default.gains_count
+
+    def only_on_lesser(judge, members, untunable):
+        asked.append(len(members))
+        return len(members) > 1 and counted(judge, members, untunable)
+
+    with mock.patch.object(method_of_default, "gains_count", only_on_lesser):
+        campaign = told(begin(), pendulum)
+        test = campaign.ask()
+    assert asked and len(campaign._method.committee()) > 1
+    assert same_bits(test.genes, campaign.experiments[0].test.genes) and test.hold_back is not None
+
+
 def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further_than_the_next_flight(
     begin, pendulum
 ):

@@ -83,6 +83,9 @@ def test_the_last_flight_that_was_predicted_confirms_within_two_spreads(runs, an
         (1.0, 0.1, 1.19, True),
         (1.0, 0.1, 1.3, False),
         (1.0, 0.0, 1.05, True),
+        # Within two spreads of 2 is nearly everything.
+        (1.0, 2.0, 1.29, True),
+        (1.0, 2.0, 1.5, False),
         (None, None, 1.0, False),
         (np.inf, np.inf, 1.0, False),
     ],

@@ -37,6 +37,10 @@ SPREAD_OF_MISSING = 0.35
 on the zoo and on machines outside it, 17 were within that and 22 within twice that; with 0.15 it were 13 and 17."""
 OF_A_MISS = 2.0
 """Spread of a prediction over the usual miss of earlier ones: of normal misses 87 % are then within two spreads."""
+PROMISE = 0.02
+"""Share of itself by which a predicted quality is below the best one flown if something is promised by it."""
+NOTHING_KEPT = 0.5
+"""Spread of a promise at most, as a share of it: within two of these nothing of it has come."""
 
 
 def needed_factor(twin: Twin, test: Test | Replay, flown: Trajectory) -> float | None:
@@ -81,6 +85,9 @@ def calibrated(
 ) -> float:
     """Spread of a predicted quality, no smaller than what earlier predictions missed by, their bias included.
 
+    Where a better flight is promised than any before, those tell most of which that was promised, too: what has flown
+    once is easily foretold. Of a promise as large a share may be missing as of the earlier ones.
+
     Args:
         spread: standard deviation over members and noise.
         predicted: the quality.
@@ -89,6 +96,29 @@ def calibrated(
 
     Returns:
         The standard deviation of the prediction; `spread` where the prediction is infinite.
+    """
+    every = list(flights)
+    found = beside_misses(spread, predicted, every, misses_own)
+    best = min((quality for _, quality in _flown(every)), default=predicted)
+    promise = _promised(predicted, best) if isfinite(predicted) else 0.0
+    if not promise:
+        return found
+    unkept = _unkept(every)[-2:]
+    if not unkept:
+        return beside_misses(found, predicted, [], misses_own)
+    return max(found, promise * min(NOTHING_KEPT, OF_A_MISS * sqrt(unkept[0] * unkept[-1])))
+
+
+def beside_misses(
+    spread: float, predicted: float, flights: Iterable[Experiment], misses_own: bool = False
+) -> float:
+    """The same, whatever is promised.
+
+    Args:
+        spread: standard deviation over members and noise.
+        predicted: the quality.
+        flights: recorded so far, with the predictions that they were flown on.
+        misses_own: whether the twin misses flights that it was learnt from.
     """
     if not isfinite(predicted):
         return spread
@@ -116,14 +146,36 @@ def misses(flights: Iterable[Experiment]) -> list[float]:
         flights: recorded so far, with the predictions that they were flown on.
     """
     return [
-        abs(run.test.predicted - run.quality) / abs(run.quality)
-        for run in flights
-        if run.test is not None
-        and not run.off_start
-        and run.test.predicted is not None
-        and run.quality
-        and isfinite(run.test.predicted)
+        abs(predicted - quality) / abs(quality)
+        for predicted, quality in _flown(flights)
+        if quality and predicted is not None
     ]
+
+
+def _flown(flights: Iterable[Experiment]) -> list[tuple[float | None, float]]:
+    """What was predicted of each test that was flown, None where nothing was, and its quality."""
+    return [
+        (predicted if predicted is not None and isfinite(predicted) else None, run.quality)
+        for run in flights
+        if run.test is not None and not run.off_start and run.quality is not None
+        for predicted in (run.test.predicted,)
+    ]
+
+
+def _promised(predicted: float, best: float) -> float:
+    """By how much a flight is predicted to be better than the best one so far; 0 where that is hardly anything."""
+    better = best - predicted
+    return better if better > PROMISE * abs(predicted) else 0.0
+
+
+def _unkept(flights: Sequence[Experiment]) -> list[float]:
+    """Share of each promise so far by which its flight has missed, 1 at most."""
+    best, found = float("inf"), []
+    for predicted, quality in _flown(flights):
+        if isfinite(best) and predicted is not None and (promise := _promised(predicted, best)):
+            found.append(min(1.0, abs(predicted - quality) / promise))
+        best = min(best, quality)
+    return found
 
 
 def missed(flights: Iterable[Experiment]) -> float:

@@ -14,7 +14,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import enumerated, two_digits
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.alone import share_of
-from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
+from twinloop.campaign.identify_and_plan.calibration import beside_misses, calibrated, missed
 from twinloop.campaign.identify_and_plan.track_record import (
     SURE,
     confirmed,
@@ -190,7 +190,9 @@ class Choice:
     def _not_preferred(self, recorded: Floats, tuned: Floats, flown: Test, better: float) -> str:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         alone = self._measured_alone(flown) if self.planner.options.track_record else None
-        of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
+        others = self.book.of_task(tuned, flown.number)
+        # Where a promise was broken the spread of the next one would rule out whatever is promised.
+        of_others = partial(self._expected, others, recorded[:, :, 0], beside_misses)
         if alone is not None and (spoken := self._spoken_against(alone, flown, of_others)):
             return spoken
         if better < self.confidence:
@@ -276,10 +278,12 @@ class Choice:
         """How the gains of a test have fared, of which the twin may know nothing."""
         return standing.fared(self.book, test.genes, excited=False)
 
-    def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
+    def _expected(
+        self, test: Test, recorded: Floats, calibrate: Callable[..., float] = calibrated
+    ) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
         predicted, spread = self._moved(test.genes).added_to(*expected(recorded))
-        return predicted, calibrated(spread, predicted, self.book.experiments, self.misses)
+        return predicted, calibrate(spread, predicted, self.book.experiments, self.misses)
 
     def _moved(self, genes: Floats) -> Moved:
         """What known disturbances do to the task's flight with some gains (size,), without excitation."""

@@ -390,7 +390,7 @@ class IdentifyAndPlan:
             slower(TUNED_WITH) if true else borne,
             latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
             self._ending(latest, book),
-            gains_count(self.planner, latest.believed, untunable),
+            gains_count(self.planner, latest.believed[:1], untunable),
             lawless,
             untunable,
         )

@@ -18,6 +18,8 @@ SURE = 2.0
 """Spreads of a predicted quality that a flight may be off it and still confirm it."""
 NEARLY = 0.1
 """Share of a quality by which a prediction may be off it and still have come true."""
+WIDE = 0.15
+"""Share of itself from which on the spread of a prediction shows nothing: nearly all is within twice more."""
 UNPROVEN = 0.028
 """Least risk of gains that have not flown, as long as no prediction has come true since the last one that did not: of
 88 second flights of the zoo and of machines outside it 2 left their envelopes, (2 + 1/2) / (88 + 1)."""
@@ -53,7 +55,7 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
         experiments: in the order of `tell`.
     """
     run = _last_predicted(experiments)
-    return run is None or _came_true(run, 0.0)
+    return run is None or _came_true(run)
 
 
 def nearly_confirmed_in_a_row(experiments: Sequence[Experiment], or_better: bool = False) -> int:
@@ -71,7 +73,7 @@ def nearly_confirmed_in_a_row(experiments: Sequence[Experiment], or_better: bool
         if run.test is None:
             continue
         genes, predicted = run.test.genes.tobytes(), _predicted([run])
-        if predicted and not (_came_true(run, NEARLY) or (or_better and _better(run))):
+        if predicted and not (_nearly(run) or (or_better and _better(run))):
             count = 0
         elif predicted and genes not in flown:
             count += 1
@@ -144,15 +146,26 @@ def _last_predicted(experiments: Sequence[Experiment]) -> Experiment | None:
     return found[-1][0] if found else None
 
 
-def _came_true(run: Experiment, share: float) -> bool:
-    """Whether a quality was predicted, and came out within two spreads of that, or within a share of itself."""
+def _nearly(run: Experiment) -> bool:
+    """Whether a quality was predicted, and came out within a tenth of itself, or two spreads that are not too wide."""
+    return _came_true(run, NEARLY, WIDE)
+
+
+def _came_true(run: Experiment, share: float = 0.0, widest: float = np.inf) -> bool:
+    """Whether a quality was predicted, and came out within two spreads of that, or within a share of itself.
+
+    Args:
+        run: a flight.
+        share: of the quality.
+        widest: spread that counts, as a share of the prediction.
+    """
     test = run.test
     if test is None or test.predicted is None or test.spread is None or run.quality is None:
         return False
     # That a flight diverges is no quality, and comes true in none that has one.
     if not np.isfinite(test.predicted):
         return False
-    spread = held_to(test.predicted, test.spread)
+    spread = min(held_to(test.predicted, test.spread), widest * abs(test.predicted))
     return bool(abs(test.predicted - run.quality) <= max(SURE * spread, share * run.quality))
 
 
@@ -181,7 +194,7 @@ def unproven_risk(
     if not is_bounded(signals) or fared.flights > 0 or nearly_confirmed_in_a_row(experiments) > 0:
         return 0.0
     predicted = [run for run, _ in reversed(_predicted(experiments))]
-    untrue = list(takewhile(lambda run: not _came_true(run, NEARLY), predicted))
+    untrue = list(takewhile(lambda run: not _nearly(run), predicted))
     stopped = [run.trajectory.ended == "aborted" and not run.left_envelope for run in untrue]
     counted = [run for run, by_hand in zip(untrue, stopped, strict=True) if sum(stopped) > 1 or not by_hand]
     left = sum(not run.kept_envelope for run in counted)
