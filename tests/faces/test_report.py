@@ -208,6 +208,17 @@ def test_the_spread_of_a_test_that_waits_is_no_power_of_ten(good, monkeypatch):
     assert "predicted, risk not estimated. Because." in text
 
 
+def test_a_test_whose_run_was_withdrawn_waits_again(good):
+    campaign = tl.Campaign.from_record(good.to_record(), threads=1)
+    campaign.test({"angle.kp": 1.0, "angle.ki": 0.0, "angle.kd": 0.1})
+    number = campaign.experiments[-1].number
+    campaign.withdraw(campaign.experiments[-1].test, "the wrong log")
+    text = "".join(Elements(report_page(campaign, "pendulum", {"name": "a pendulum"}, {})).text)
+    assert f"Test {number} waits to be flown" in text and "No test is waiting" not in text
+    # One of one's own may have been made only to see what the twin predicts.
+    assert text.count("waits to be flown") == 1
+
+
 def test_strange_names_and_reasons_are_shown_and_never_run(good):
     strange = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>"
     campaign = tl.Campaign.from_record(good.to_record(), threads=1)

@@ -26,6 +26,7 @@ from twinloop.faces.report.tables import flights as of_flights
 from twinloop.faces.report.tables import twin as of_twin
 from twinloop.faces.report.tables.table import Table, shown_spread
 from twinloop.faces.result import summary
+from twinloop.faces.telling import awaited
 from twinloop.faces.text.controller import advice_words
 from twinloop.faces.verdict import evidence, verdict
 from twinloop.planning.leaving import risk_words
@@ -164,8 +165,9 @@ def _figures(found: Examination, names: Sequence[str]) -> list[Figure]:
 def _next(campaign: Campaign, result: Mapping[str, Any]) -> dict[str, object]:
     """What is waiting to be flown, and what another flight would bring."""
     known = "advice" in result and result["advice"]["gain"] is not None
+    waiting = {test.number: test for test in (*awaited(campaign), *campaign.waiting)}
     return {
-        "waiting": campaign.waiting,
+        "waiting": list(waiting.values()),
         "words": advice_words(result) if known else "",
         "flights": campaign.setup.predicted_flights,
     }
