@@ -57,7 +57,7 @@ def read(kind, text):
             return json.loads(text)["parameters"][NAMES[kind]]
 
 
-@KINDS
+@pytest.mark.parametrize("kind", [kind for kind in FORMATS if kind != "betaflight"])
 @given(gain=st.floats(-1e6, 1e6))
 def test_the_file_holds_the_value_in_the_precision_of_the_autopilot(kind, gain):
     found = read(kind, autopilot(kind, scale=2.0, offset=0.5).text({"roll.kp": gain}, "new"))
@@ -66,6 +66,19 @@ def test_the_file_holds_the_value_in_the_precision_of_the_autopilot(kind, gain):
     assert found == (expected if kind in ("ros2", "json") else float(np.float32(expected))) or np.float32(
         found
     ) == np.float32(expected)
+
+
+@given(gain=st.floats(-1e6, 1e6))
+def test_what_betaflight_would_cut_off_is_refused_unless_it_may_be_rounded(gain):
+    expected = 10.0 * gain
+    if expected != int(expected):
+        with pytest.raises(tl.InvalidInput, match="expected a whole number, for betaflight cuts off"):
+            autopilot("betaflight", scale=10.0).text({"roll.kp": gain}, "new")
+    else:
+        held = np.float32(expected)
+        assert read("betaflight", autopilot("betaflight", scale=10.0).text({"roll.kp": gain}, "new")) == held
+    rounded = autopilot("betaflight", scale=10.0, whole=True).text({"roll.kp": gain}, "new")
+    assert read("betaflight", rounded) == round(expected)
 
 
 @KINDS
@@ -122,8 +135,8 @@ def test_no_name_breaks_out_of_its_line(kind, name):
 @KINDS
 @given(heading=st.text())
 def test_no_heading_breaks_out_of_its_comment(kind, heading):
-    bare, headed = (autopilot(kind).text({"roll.kp": 0.5}, each) for each in ("", heading))
-    assert read(kind, headed) == 0.5
+    bare, headed = (autopilot(kind).text({"roll.kp": 5.0}, each) for each in ("", heading))
+    assert read(kind, headed) == 5.0
     assert len(headed.splitlines()) == len(bare.splitlines())
 
 

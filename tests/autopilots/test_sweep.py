@@ -153,6 +153,7 @@ def test_a_sweep_that_an_autopilot_cannot_make_is_refused(kind, change, said):
     [
         {"amplitude": math.nan}, {"amplitude": 0.0}, {"last": 0.5}, {"last": math.inf}, {"fade_in": -1.0},
         {"fade_in": 3.0, "fade_out": 3.0}, {"duration": -1.0}, {"scale": math.nan},
+        {"axis": ["rate roll"]}, {"command": 3},
     ],
 )  # fmt: skip
 def test_numbers_that_make_no_sweep_are_refused(change):

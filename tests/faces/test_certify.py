@@ -150,6 +150,13 @@ def test_a_controller_that_fails_a_check_is_refused_and_sets_nothing(flown, tmp_
     assert "Do not fly these gains" in Page((tmp_path / "made" / "certificate.html").read_text()).text
 
 
+def test_earlier_gains_are_gone_though_the_page_cannot_be_made(flown, tmp_path, monkeypatch):
+    (tmp_path / "gains.param").write_text("ATC_RAT_RLL_P,9.9\n", encoding="utf-8")
+    monkeypatch.setattr("twinloop.faces.certifying.page", lambda *_: 1 / 0)
+    certify(flown[1], tmp_path)
+    assert not list(tmp_path.glob("gains.*"))
+
+
 @pytest.mark.parametrize(
     ("mapping", "said"),
     [

@@ -35,6 +35,11 @@ def step(x, u):
 def rig(noise=0.0, seed=0):
     return tl.systems.Simulated(signals, step, noise=noise, seed=seed)
 
+def broken():
+    from pathlib import Path
+
+    return tl.systems.Simulated(signals, lambda x, u: step(x, u) if Path("mended").exists() else (float("nan"), 0.0))
+
 def deaf(signals):
     return tl.systems.Simulated(signals, lambda x, u: x)
 
@@ -93,6 +98,22 @@ main(["run", "rig.toml", "--experiments", "3", "--threads", "1", "--store", "rig
     again = run("resume", "rig2.db", "--threads", "1")
     assert again.exit_code == 0, again.output
     assert same(flights("rig.db"), flights("rig2.db"))
+
+
+def test_where_all_flights_failed_it_is_said_why_and_how_to_go_on_and_nobody_was_interrupted(folder):
+    written(folder, PENDULUM, section("rig:broken"))
+    done = run("run", "rig.toml", "--experiments", "1", "--threads", "1")
+    assert done.exit_code == 1 and done.stdout == "" and "Interrupted" not in done.stderr
+    assert "test 0 failed: a state left" in done.stderr and "stopped being finite" in done.stderr
+    withdraw, resume = "withdraw rig.db 0 --reason WHY", "resume rig.db --experiments 2"
+    assert f"take that back: twinloop {withdraw}. Go on with more: twinloop {resume}" in done.stderr
+    (folder / "mended").touch()
+    assert run(*withdraw.split()).exit_code == 0
+    # A run that was taken back is spent until its test is told anew.
+    spent = run("resume", "rig.db", "--threads", "1")
+    assert spent.exit_code == 1 and "all 1 runs are spent" in spent.stderr and resume in spent.stderr
+    done = run(*resume.split(), "--threads", "1")
+    assert done.exit_code == 0 and len(flights("rig.db")) == 2, done.output
 
 
 HANGS = """
@@ -346,4 +367,4 @@ def test_a_campaign_flown_by_hand_can_be_left_to_a_system(folder):
     done = run("resume", "rig.db")
     assert done.exit_code == 2 and "--experiments N" in done.stderr
     done = run("resume", "rig.db", "--experiments", "1")
-    assert done.exit_code == 0 and len(flights("rig.db")) == 1, done.output
+    assert done.exit_code == 0 and len(flights("rig.db")) == 2, done.output

@@ -416,6 +416,87 @@ def test_a_reading_that_is_none_ends_the_flight_and_the_fallback_flies_on_what_t
     assert told.steps == 9 and same_bits(told.states, states[:10])
 
 
+def test_one_missing_reading_is_missing_for_one_period_alone():
+    """The guard trips on it; its fallback, of the same gains, flies on by the sensor that reads again."""
+    test = dataclasses.replace(new_campaign().test(GOOD, excitation=None), steps=150)
+    guard = Guard(test, test.controller(), clock=None)
+    states, _ = fly(guard, test, lambda k, x: np.where(k == 10, [np.nan, x[1]], x))
+    assert guard.tripped_at == 10
+    # As a controller flies that is given the reading before instead.
+    held, last = test.controller(), None
+    x = np.array(test.initial_state)
+    for k in range(test.steps):
+        last = x if k != 10 else np.array([last[0], x[1]])
+        x = np.array(pendulum_step(x, held.command(last, test.target(0))))
+    np.testing.assert_allclose(states[-1], x, atol=1e-9)
+
+
+def stuck_from(first, stream):
+    """A noisy sensor of the angle that repeats itself from a period on, beside a healthy one of the rate."""
+    read = []
+
+    def sensor(k, x):
+        read.append(x + stream.normal(size=2) * NOISE)
+        if k >= first:
+            read[-1][0] = read[first][0]
+        return read[-1]
+
+    return sensor
+
+
+@pytest.mark.parametrize("first", [2, 3, 4, 6])
+def test_a_sensor_that_another_check_notices_first_is_found_frozen_after_it(campaign, first):
+    test = dataclasses.replace(campaign.test(GOOD, excitation=None), steps=150)
+    guard = campaign.guard(test, clock=None)
+    states, _ = fly(guard, test, stuck_from(first, np.random.default_rng(first)))
+    assert guard.tripped_at <= first + 6 and guard._broken.tolist() == [True, False]
+    assert np.abs(states[:, 0]).max() < 1.3 and np.abs(states[-1, 0] - 0.8) < 0.1
+    # One that moves again is believed again.
+    guard.command([0.5, 0.0], test.target(0))
+    assert not guard._broken.any()
+
+
+def test_a_rate_that_is_made_of_a_frozen_angle_is_no_rate():
+    signals = dataclasses.replace(
+        SIGNALS, states=(SIGNALS.states[0], dataclasses.replace(RATE, measured=False))
+    )
+    campaign = tl.Campaign(
+        signals, controller=PENDULUM_CONTROLLER, initial_state=[0.0, 0.0], target_state=[0.8, 0.0], duration=4.0,
+        threads=1, options=THOROUGH,
+    ).run(tl.systems.Simulated(signals, pendulum_step, default_gains=GOOD, noise=[2e-3, 0.0], seed=5), 2)  # fmt: skip
+    test = campaign.test(GOOD, excitation=None)
+    guard = campaign.guard(test, clock=None, horizon=0.05)
+    sensor, x = stuck_from(6, np.random.default_rng(1)), np.array(test.initial_state)
+    rates, seen = [], []
+    for k in range(test.steps):
+        rates.append(x[1])
+        command = guard.command(sensor(k, x)[:1], test.target(0))
+        seen.append(guard._estimate[1])
+        x = np.array(pendulum_step(x, command))
+    assert "angle has not changed" in guard.reason and guard._broken.all()
+    after = slice(guard.tripped_at + 2, guard.tripped_at + 10)
+    # What is expected of the next period is behind the truth by what was off at the trip, and not 0 for ever.
+    assert np.std(seen[after]) > 0.1 and np.abs(x[0] - 0.8) < 0.2
+    # The rate over the jump back is none either.
+    guard.command([0.5], test.target(0))
+    assert guard._broken.tolist() == [False, True]
+    guard.command([0.51], test.target(0))
+    assert not guard._broken.any()
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_without_a_horizon_or_a_twin_that_follows_a_frozen_sensor_is_found_all_the_same(
+    campaign, monkeypatch, follows
+):
+    test = dataclasses.replace(campaign.test(GOOD, excitation=None), steps=150)
+    monkeypatch.setattr(campaign.twin, "follows", follows)
+    guard = campaign.guard(test, clock=None, horizon=0.0)
+    states, _ = fly(guard, test, stuck_from(6, np.random.default_rng(6)))
+    assert guard.tripped_at == 11 and "has not changed in its last bit" in guard.reason
+    # What is read instead only a twin knows.
+    assert not follows or np.abs(states[:, 0]).max() < 1.3
+
+
 def test_a_flight_whose_first_reading_is_none_has_no_period_and_starts_where_the_test_does():
     test = dataclasses.replace(new_campaign().test(GOOD), initial_state=np.array([0.25, 0.0]))
     for number in range(20):
@@ -811,6 +892,36 @@ def test_a_system_that_asks_for_too_few_commands_is_refused(asks):
         guarded.run(new_campaign().test(GOOD, excitation=None))
     assert guarded.flown.steps == 30
     assert guarded_by_hand(OwnLoop(asks=30)).run(new_campaign().test(GOOD, excitation=None)).steps == 6
+
+
+class Garbled(tl.System):
+    """A rig that closes its own loop, and one reading of which is garbage."""
+
+    signals = SIGNALS
+    default_gains = GOOD
+
+    def __init__(self, garbage):
+        self.garbage = garbage
+
+    def run(self, test):
+        controller, x, read, sent = test.controller(), np.zeros(2), [], []
+        for k in range(test.steps):
+            read.append(np.where(k == 10, [self.garbage, x[1]], x))
+            sent.append(controller.command(read[-1], test.target(k)))
+            x = np.array(pendulum_step(x, sent[-1]))
+        self.last = x
+        return tl.Trajectory(SIGNALS.dt * np.arange(test.steps + 1), [*read, x], sent)
+
+
+@pytest.mark.parametrize("garbage", [np.nan, np.inf, 1e6])
+def test_a_guarded_rig_flies_on_through_a_reading_that_is_none_and_what_it_flew_is_told(garbage):
+    campaign, rig = new_campaign(), Garbled(garbage)
+    guarded = campaign.guarded(rig)
+    campaign.run(guarded, 1)
+    (flight,) = campaign.experiments
+    assert flight.trajectory.ended == "aborted" and flight.trajectory.steps == 9
+    assert "the reading of angle" in flight.trajectory.reason and not campaign.failures
+    assert guarded.guard.period == 30 and np.abs(rig.last[0] - 0.8) < 0.2
 
 
 def test_after_a_run_that_failed_the_guard_is_the_one_of_that_run():

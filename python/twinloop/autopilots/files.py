@@ -31,6 +31,7 @@ class Format:
         single: whether it holds numbers in single precision.
         written: its lines after the heading, of the values and the node.
         comment: what a line of the heading begins with; empty: it has none.
+        whole: whether it holds whole numbers alone.
     """
 
     suffix: str
@@ -38,6 +39,7 @@ class Format:
     single: bool
     written: Callable[[Set, str], str]
     comment: str = "# "
+    whole: bool = False
 
 
 def _px4(values: Set, node: str) -> str:
@@ -78,7 +80,7 @@ FORMATS = {
     "px4": Format(".params", MAVLINK, True, _px4),
     "px4-shell": Format(".txt", MAVLINK, True, _px4_shell),
     "ardupilot": Format(".param", MAVLINK, True, _ardupilot),
-    "betaflight": Format(".txt", re.compile(r"[a-z][a-z0-9_]{0,63}"), True, _betaflight),
+    "betaflight": Format(".txt", re.compile(r"[a-z][a-z0-9_]{0,63}"), True, _betaflight, whole=True),
     "ros2": Format(".yaml", re.compile(r"[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*"), False, _ros2),
     "json": Format(".json", re.compile(r"[^\x00-\x1f\x7f]{1,200}"), False, _json, ""),
 }
@@ -133,7 +135,8 @@ class Autopilot:
             gains: all of a controller, by name, in their units.
 
         Raises:
-            InvalidInput: a gain without a parameter, one that is not finite, or a value beyond its limits.
+            InvalidInput: a gain without a parameter, one that is not finite, or a value beyond its limits, or that the
+                autopilot would cut off.
         """
         return {name: value for name, (value, _) in self._held(gains).items()}
 
@@ -157,6 +160,11 @@ class Autopilot:
             return values
         held: Set = {}
         for name, (value, whole) in values.items():
+            if FORMATS[self.kind].whole and value != int(value):
+                raise InvalidInput(
+                    f"Parameter {name!r}: expected a whole number, for {self.kind} cuts off what follows the point,"
+                    f" found {value:g}; say whole = true, and it is rounded, and correct its scale if gains are small."
+                )
             if not abs(value) <= (2**31 - 1 if whole else float(np.finfo(np.float32).max)):
                 raise InvalidInput(
                     f"Parameter {name!r}: expected a number of 32 bits, found {value:g}; correct its scale."

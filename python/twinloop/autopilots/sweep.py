@@ -69,6 +69,11 @@ class Sweep:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        for name in ("command", "axis"):
+            if not isinstance(getattr(self, name), str):
+                raise InvalidInput(
+                    f"Sweep, {name}: expected a text such as 'rate roll', found {getattr(self, name)!r}."
+                )
         for name in ("amplitude", "first", "duration", "scale"):
             object.__setattr__(self, name, number(f"Sweep, {name}", getattr(self, name), above=0.0))
         for name in ("last", "fade_in", "fade_out"):

@@ -42,13 +42,14 @@ def certify(
     campaign, autopilot = given.campaign, given.autopilot
     found = campaign.certificate()
     texts = _parameter_files(found, autopilot)
+    output.mkdir(parents=True, exist_ok=True)
+    # Earlier gains are no longer certified, whatever happens now.
+    for suffix in {form.suffix for form in FORMATS.values()}:
+        (output / f"gains{suffix}").unlink(missing_ok=True)
     names = {key: file for key, (file, _) in texts.items()}
     certified = facts(campaign, found, shown_name(store), given.name, autopilot, names)
     signals = campaign.signals
     html = page(certified, signals.state_names, [state.unit for state in signals.states])
-    output.mkdir(parents=True, exist_ok=True)
-    for suffix in {form.suffix for form in FORMATS.values()}:
-        (output / f"gains{suffix}").unlink(missing_ok=True)
     # What takes the gains back is there before what sets them, whatever happens between.
     for file, text in texts.values():
         write_whole(output / file, text)

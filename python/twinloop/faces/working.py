@@ -121,7 +121,7 @@ def work(
         KeyboardInterrupt: an interruption before there was a result.
     """
     clock = Stopwatch(campaign.threads)
-    stopped = False
+    stopped = ended = False
     campaign.landed = lambda test, flight: _say_against(campaign, rig, watch, experiments, test, flight)
     try:
         with watch, suppress(KeyboardInterrupt):
@@ -136,9 +136,13 @@ def work(
                 click.echo(f"twinloop: {_raised_by(name, reason, campaign.store is not None)}", err=True)
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
+            ended = True
         if (campaign.interrupted or stopped) and campaign.store is not None:
             click.echo(f"Saved. Continue with: {next_command(campaign, 'resume')}", err=True)
         if stopped and not campaign.experiments:
+            return 1
+        if ended and not campaign.experiments and not campaign.interrupted:
+            click.echo(f"twinloop: {_nothing_flown(campaign, experiments)}", err=True)
             return 1
         if not campaign.experiments or knows_nothing(campaign):
             raise KeyboardInterrupt
@@ -162,6 +166,20 @@ def _raised_by(name: str, reason: Exception, kept: bool) -> str:
     """That the code of a system raised, and what becomes of the test that it was to fly."""
     waits = "The test still waits and nothing is lost: correct that, then go on." if kept else "Correct that."
     return f"System {name!r}: expected a run, found {raised(reason)}. {waits}"
+
+
+def _nothing_flown(campaign: Campaign, experiments: int) -> str:
+    """That nothing was flown that something can be learnt from, why, and what to do."""
+    found, again = f"all {experiments} runs are spent", "Begin again with another controller that you trust."
+    if campaign.store is not None:
+        again = f"Go on with more: {next_command(campaign, 'resume', '--experiments', campaign.runs + 1)}"
+    if campaign.failures:
+        failure = campaign.failures[-1]
+        found = f"test {failure.test.number} failed: {failure.reason}"
+        if campaign.store is not None:
+            withdraw = next_command(campaign, "withdraw", failure.test.number, "--reason", "WHY")
+            again = f"If its gains were not the cause, take that back: {withdraw}. {again}"
+    return f"Expected a flight to learn from, found none: {found}. {again}"
 
 
 def _say_against(

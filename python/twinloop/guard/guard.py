@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from twinloop import _core
 from twinloop._experiment.envelope import outside, usages_of
@@ -27,7 +27,7 @@ from twinloop.law.twin import Twin
 from twinloop.signals import Bounds, Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
-from twinloop.unmeasured import Differences, completed_state, or_measured
+from twinloop.unmeasured import Differences, completed_state, or_measured, sources
 
 HORIZON = 0.2
 """Share of a test's length that is looked ahead where no horizon is given."""
@@ -44,7 +44,8 @@ class Guard:
     check or the controller raises an error, it has *tripped*: from then on it sends the fallback's commands, and
     `trajectory` has the flight up to there.
 
-    For the fallback, a reading that cannot be trusted is replaced by the twin's prediction from the previous reading.
+    For the fallback, a reading that cannot be trusted is replaced by the twin's prediction from the previous reading,
+    as long as that is so: sensors are watched after the trip, too, and one that reads again is believed again.
     Until the guard trips a fallback with a memory runs along on the readings that can be trusted, with its answers
     discarded, so that it takes over a steady load. With `reset()` it begins from rest.
 
@@ -53,8 +54,10 @@ class Guard:
         fallback: a controller for the same signals, whose `command` is called in each period, before the guard trips,
             too; or a command that is safe to hold (n_u,), in its units and within its bounds.
         twin: for the prediction and the band; None: only readings, envelope and clock are checked.
-        flown: flights so far with their tests, on which the band is checked.
-        horizon: of the prediction, s, rounded up to whole periods; 0: no prediction. None: a fifth of the test.
+        flown: flights so far with their tests, on which the band is checked, and which say, where there is no twin, how
+            long a sensor repeats itself.
+        horizon: of the prediction, s, rounded up to whole periods; 0: none of the flight's leaving, of missing readings
+            alone. None: a fifth of the test.
         false_alarms: share of flights that the check of the band ends without cause, by the committee's own
             prediction.
         overrun: share of the period by which a period may be late.
@@ -98,10 +101,12 @@ class Guard:
         self._middle = np.array([0.0 if np.isinf(low) else 0.5 * (low + high) for low, high in bounds])
         self._half = np.array([0.5 * (high - low) for low, high in bounds])
         self._aheads = [] if twin is None or not self.horizon else _look_aheads(test, twin, bounds)
+        self._expecting = self._aheads[-1:] if twin is None or self._aheads else _blind(test, twin, bounds)
+        self._predicting = [*self._aheads[:-1], *self._expecting]
         drawn = twin is not None and twin.members and twin.noise is not None
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
         limits = Limits(self.signals) if limits is None else limits
-        known = () if twin is None else twin.flights
+        known = [flight for _, flight in flown] if twin is None else twin.flights
         noise = None if twin is None or twin.noise is None else twin.noise.sensors
         banded = self._band is not None
         self._sensors = SensorWatch(limits.readings, known, self.signals.measured, banded, noise)
@@ -109,7 +114,7 @@ class Guard:
         if twin is not None and self._sensors.limit is not None and self._sensors.pitches.any():
             self._rounded = RoundedWatch(twin, self._sensors.pitches, self._sensors.limit)
         self._controller = test.controller()
-        self._differences = Differences(self.signals)
+        self._differences, self._rates = Differences(self.signals), sources(self.signals)
         self._states = np.empty((test.steps + 1, n_x))
         self._commands = np.empty((test.steps, n_u))
         self.reset()
@@ -140,7 +145,7 @@ class Guard:
         self._sensors.reset()
         if self._standby is not None:
             self._standby.reset()
-        for ahead in self._aheads:
+        for ahead in self._predicting:
             ahead.reset()
         if self._band is not None:
             self._band.reset()
@@ -177,6 +182,8 @@ class Guard:
         if not self.tripped:
             with self._tripping("a check"):
                 self._watch(reading)
+        else:
+            self._untrusted(reading)
         reading = self._believed(reading)
         if not self.tripped:
             with self._tripping("the controller"):
@@ -194,14 +201,24 @@ class Guard:
         else:
             command = np.array(self.fallback, dtype=np.float64)
         self._estimate = reading
-        if self._aheads:
-            next_one = self._aheads[-1].following(reading, command)
+        for expecting in self._expecting:
+            next_one = expecting.following(reading, command)
             # Flown blind for long a twin may diverge: then the last reading that was believed is the better guess.
             self._estimate = np.where(np.abs(next_one) <= self._sensors.farthest, next_one, reading)
-        for ahead in self._aheads:
+        for ahead in self._predicting:
             ahead.sent(reading, goal, command)
         self.period += 1
         return command
+
+    @property
+    def recorded(self) -> int:
+        """Periods of the flight so far that a record can hold, up to where it has tripped.
+
+        What it tripped on may be no reading: then the flight ends a period sooner.
+        """
+        if self.tripped_at is None or self.tripped_at > self.test.steps:
+            return min(self.period, self.test.steps)
+        return self.tripped_at if self._last is not None else max(0, self.tripped_at - 1)
 
     def trajectory(self, last: ArrayLike | None = None) -> Trajectory:
         """The flight: complete, or until the guard tripped, with the reason.
@@ -221,12 +238,10 @@ class Guard:
         """
         dt, steps = self.signals.dt, self.test.steps
         ended_at = self.tripped_at if self.tripped_at is not None and self.tripped_at <= steps else None
-        n = min(self.period, steps) if ended_at is None else ended_at
+        n = self.recorded
         if ended_at is not None and self._last is not None:
             last = self._last
         elif ended_at is not None:
-            # What it tripped on is no reading: the flight ends a period sooner.
-            n = max(0, ended_at - 1)
             last = self._states[n] if ended_at else self.test.initial_state
         elif self.period > steps:
             if last is not None and not self.tripped:
@@ -258,12 +273,11 @@ class Guard:
 
     def _watch(self, reading: Floats) -> None:
         """Trips on the first thing that is wrong."""
-        missing, frozen = self._sensors.missing(reading), self._sensors.frozen(reading)
         states = self.signals.states
+        missing, wrong = self._sensors.missing(reading), self._untrusted(reading)
         self._last = None if missing.any() else reading.copy()
-        if missing.any() or frozen.any():
-            self._broken = missing | frozen
-            i = int(np.argmax(self._broken))
+        if wrong.any():
+            i = int(np.argmax(wrong))
             if not missing[i]:
                 what = "has not changed in its last bit for too long"
             elif not np.isfinite(reading[i]):
@@ -295,7 +309,7 @@ class Guard:
             flown = self._states[: self.period + 1], self._commands[: self.period]
             still = self._rounded.frozen(*flown, self._sensors.repeated)
             if still.any() and not self._band.outside:
-                self._broken = still
+                self._broken = self._with_rates(still)
                 name = states[int(np.argmax(still))].name
                 return self._trip(
                     f"the reading of {name} has not changed for too long, though by the twin it should have moved"
@@ -308,6 +322,24 @@ class Guard:
                 seconds = found[0] * self.signals.dt
                 return self._trip(f"{states[found[1]].name} would leave its envelope in {seconds:.3g} s")
         return None
+
+    def _untrusted(self, reading: Floats) -> NDArray[np.bool_]:
+        """States (n_x,) whose sensor gives nothing, what cannot be, or nothing new.
+
+        One that was found frozen is so until it moves, and rates that are made of such readings are none either.
+        """
+        wrong = self._sensors.missing(reading) | self._sensors.frozen(reading)
+        self._broken = self._with_rates(wrong | (self._broken & (self._sensors.repeated > 0)), self._broken)
+        return wrong
+
+    def _with_rates(
+        self, broken: NDArray[np.bool_], before: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.bool_]:
+        """The same with the rates that are computed of such readings, of this period or of the one before."""
+        found = broken.copy()
+        for rate, of in self._rates:
+            found[rate] |= broken[of] or (before is not None and before[of])
+        return found
 
     @contextmanager
     def _tripping(self, what: str) -> Iterator[None]:
@@ -331,11 +363,10 @@ class Guard:
 
     def _believed(self, reading: Floats) -> Floats:
         """The reading, with the twin's prediction from the one before instead of readings that cannot be trusted."""
-        wrong = self._broken | self._sensors.missing(reading)
-        if not wrong.any():
+        if not self._broken.any():
             return reading
         before = self.test.initial_state if self._estimate is None else self._estimate
-        return np.where(wrong, before, reading)
+        return np.where(self._broken, before, reading)
 
 
 def _periods(seconds: float, dt: float) -> int:
@@ -388,6 +419,14 @@ def _look_aheads(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> l
     blind = sensed(members[0])
     several = [members] if blind is members[0] else [members, [blind]]
     return [_look_ahead(test, twin, each, bounds) for each in several]
+
+
+def _blind(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> list[_core.LookAhead]:
+    """What says what is read next, where nothing looks further ahead; none for a law in Python."""
+    try:
+        return [_look_ahead(test, twin, [sensed((twin.members or (twin.model,))[0])], bounds)]
+    except NotAvailable:
+        return []
 
 
 def _look_ahead(

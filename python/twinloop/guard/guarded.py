@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.controllers import Family
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._ground.arrays import Floats, floats
+from twinloop.controllers import Controller, Family
 from twinloop.controllers.custom import Law
 from twinloop.errors import InvalidInput
 from twinloop.guard.guard import Guard
@@ -61,14 +67,21 @@ class Guarded(System):
             test: what to fly.
 
         Returns:
-            The measured run, up to the moment when the guard tripped.
+            The measured run, up to the moment when the guard tripped. If that was a reading that is none, which no
+            record holds, it ends a period sooner; and where the system cannot make a record with it, what the guard has
+            recorded is the run.
 
         Raises:
             InvalidInput: the system did not ask the test's controller for every command, so that nobody watched.
         """
         self.flown = None
         self.guard = guard = self.make(test)
-        self.flown = run = self.system.run(led_by(guard, test))
+        try:
+            self.flown = run = self.system.run(led_by(guard, test))
+        except InvalidInput:
+            if guard.tripped_at is None or guard.tripped_at > test.steps:
+                raise
+            return guard.trajectory()
         if guard.period < run.steps:
             raise InvalidInput(
                 f"Guarded: expected a system that asks test.controller() for the command of each period, found one that"
@@ -77,7 +90,7 @@ class Guarded(System):
             )
         if guard.tripped_at is None or guard.tripped_at > run.steps:
             return run
-        steps = guard.tripped_at
+        steps = guard.recorded
         return dataclasses.replace(
             run,
             t=run.t[: steps + 1],
@@ -114,6 +127,8 @@ def unguarded(record: Record) -> Record:
 def led_by(law: Law, test: Test) -> Test:
     """The same test with somebody else in the loop, who adds the excitation himself, or does not.
 
+    Readings come to him as they are: NaN, for a missing one, is his affair.
+
     Args:
         law: with `reset()` and `command(state, target)`.
         test: that a system shall run.
@@ -124,4 +139,35 @@ def led_by(law: Law, test: Test) -> Test:
     family = test.family
     gains = [gain.engine for gain in family.law_gains]
     engine = _core.Family.python(family.signals.engine, lambda values: law, gains)
-    return dataclasses.replace(test.quiet(), family=Family(family.signals, family.law_gains, engine))
+    return dataclasses.replace(test.quiet(), family=_Led(family.signals, family.law_gains, engine, law))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Led(Family):
+    """A family whose only controller is somebody else.
+
+    Args:
+        law: who commands.
+    """
+
+    law: Law
+
+    def controller(
+        self, genes: ArrayLike, excitation: ArrayLike | None = None, hold_back: HoldBack | None = None
+    ) -> Controller:
+        """He, for one run."""
+        plain = super().controller(genes, excitation, hold_back)
+        return _AsRead(self, plain.genes, plain.excitation)
+
+
+class _AsRead(Controller):
+    """A controller that hands readings on as they are."""
+
+    def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
+        """The command for the coming period, within its bounds; see `Controller.command`."""
+        assert isinstance(self.family, _Led)
+        commands = self.family.signals.commands
+        low, high = np.array([command.bounds for command in commands]).T
+        given = cast(Floats, state), cast(Floats, target)
+        sent = floats("Command", self.family.law.command(*given), (len(commands),))
+        return np.clip(sent, low, high)

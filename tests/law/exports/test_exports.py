@@ -457,6 +457,12 @@ EXPORTED = pytest.mark.parametrize("exported", [in_python, pytest.param(in_c, ma
 BOUNDS = np.array([command.bounds for command in THREE.commands])
 
 
+OWN_RATES = {
+    "pid": ["level.kd"], "pid with all options": ["angle.kd", "level.kd"], "cascade": ["rate.kd"],
+}  # fmt: skip
+"""Gains on rates that a controller makes of readings itself."""
+
+
 @EXPORTED
 @pytest.mark.parametrize("which", CONTROLLERS)
 @pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
@@ -466,15 +472,62 @@ def test_an_exported_controller_repeats_its_last_command_where_a_reading_is_miss
     described = CONTROLLERS[which]
     family, genes, states, target, _ = led(described, 3)
     command = exported(described, family, genes)
-    alone = command(states, target)
-    # After each reading some are missing: what the others give is as if nobody had called.
+
+    def alone(periods):
+        """As if nobody had called; a rate that it makes itself is over so many periods."""
+        slower = genes / np.where(np.isin(family.names, OWN_RATES.get(which, [])), periods, 1.0)
+        return exported(described, family, slower)(states, target)
+
+    def assert_alike(found, periods):
+        expected = np.repeat(alone(periods), periods, axis=0)
+        if which in OWN_RATES:
+            np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+        else:
+            np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(found, np.repeat(found[::periods], periods, axis=0))
+
+    # After each reading some are missing.
     broken = np.repeat(states, 3, axis=0)
     broken[1::3, 0] = missing
     broken[2::3, :2] = missing
-    np.testing.assert_array_equal(command(broken, target), np.repeat(alone, 3, axis=0))
+    assert_alike(command(broken, target), 3)
     targets = np.repeat(np.tile(target, (len(states), 1)), 2, axis=0)
     targets[1::2, 0] = missing
-    np.testing.assert_array_equal(command(np.repeat(states, 2, axis=0), targets), np.repeat(alone, 2, axis=0))
+    assert_alike(command(np.repeat(states, 2, axis=0), targets), 2)
+
+
+@EXPORTED
+def test_after_a_drop_out_an_exported_controller_finds_the_rate_of_what_has_moved_meanwhile(exported):
+    described = tl.controllers.PID(
+        axes=[("angle", None), ("level", None)],
+        gains={f"{axis}.{term}": BOX for axis in ("angle", "level") for term in ("kp", "ki", "kd")},
+    )
+    family = described.bind(THREE)
+    genes = family.genes(
+        {"angle.kp": 0.0, "angle.ki": 0.0, "angle.kd": 1.0, "level.kp": 0.0, "level.ki": 0.0, "level.kd": 0.0}
+    )
+    ramp = np.zeros((20, 3))
+    ramp[:, 0] = 0.02 * np.arange(20)
+    ramp[5:15, 0] = np.nan
+    found = exported(described, family, genes)(ramp, np.zeros(3))[:, 0]
+    np.testing.assert_allclose(found[1:], -0.02 / THREE.dt, rtol=1e-9)
+
+
+@EXPORTED
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_what_overflows_is_no_command_though_its_bound_would_hide_it_and_is_forgotten(exported, power):
+    described = tl.controllers.PID(
+        axes=[("angle", "rate"), ("level", None)], output=tl.controllers.Mixer(np.eye(2), power=power),
+        gains={f"{axis}.{term}": BOX for axis in ("angle", "level") for term in ("kp", "ki", "kd")},
+    )  # fmt: skip
+    family = described.bind(THREE)
+    genes = family.genes(np.full(family.size, 2.5))
+    states = np.tile([0.1, 0.0, 0.1], (8, 1))
+    plain = exported(described, family, genes)(states[:7], np.zeros(3))
+    states[3] = [0.0, -1.7e308, 0.0]
+    found = exported(described, family, genes)(states, np.zeros(3))
+    np.testing.assert_array_equal(found[3], found[2])
+    np.testing.assert_allclose(np.delete(found, 3, axis=0), plain, rtol=1e-9, atol=1e-12)
 
 
 @EXPORTED

@@ -118,7 +118,7 @@ def from_other_controllers(tests: Sequence[int], change: str = "") -> Iterator[R
             "other-commands",
             f"The commands recorded of test{'s' if len(tests) > 1 else ''} {', '.join(map(str, tests))} are"
             " none that its controller gives for the recorded states: check the signs, units and order of states"
-            f" and commands, and that the recorded controller is the one that the test names.{hint}",
+            f" and commands, and that the controller that flew is the one that the test names, with its target.{hint}",
         )
 
 

@@ -38,12 +38,21 @@ class Assignment:
 
 
 class _Sheet:
-    """Lines of a law as they are written, with the memory that they need."""
+    """Lines of a law as they are written, with the memory that they need.
+
+    Attributes:
+        lines: so far.
+        memory: how many numbers are remembered.
+        wanted: names of the commands before they are clipped, which hides what overflows.
+        missed: place of the memory that counts calls that nothing else remembers; None: nobody asks for it.
+    """
 
     def __init__(self, signals: Signals) -> None:
         self.signals = signals
         self.lines: list[Assignment] = []
         self.memory = 0
+        self.wanted: list[str] = []
+        self.missed: int | None = None
 
     def let(self, target: str, value: str) -> str:
         self.lines.append(Assignment(target, value))
@@ -53,6 +62,13 @@ class _Sheet:
         """A new place of the memory, 0 at the start of a run."""
         self.memory += 1
         return f"memory[{self.memory - 1}]"
+
+    def since(self) -> str:
+        """Periods since the last call that was remembered."""
+        if self.missed is None:
+            self.missed = self.memory
+            self.memory += 1
+        return f"(1.0 + memory[{self.missed}])"
 
     def difference(self, state: int, a: str, b: str) -> str:
         period = self.signals.states[state].period
@@ -74,19 +90,17 @@ class _Sheet:
                 value = " + ".join(parts)
                 if mixer.power != 1.0:
                     value = f"signed_power({value}, {float(mixer.power)!r})"
-            self.let(f"command[{j}]", f"clip({value}, {low}, {high})")
+            self.wanted.append(self.let(f"wanted_{j}", value))
+            self.let(f"command[{j}]", f"clip({self.wanted[j]}, {low}, {high})")
 
 
-def law_lines(described: UnboundFamily, family: Family, genes: Floats) -> tuple[list[Assignment], int]:
+def _sheet(described: UnboundFamily, family: Family, genes: Floats) -> _Sheet:
     """What a controller does in a period.
 
     Args:
         described: the family as a user wrote it.
         family: the same, bound.
         genes: gains (size,).
-
-    Returns:
-        The lines, and how many numbers it remembers.
 
     Raises:
         NotAvailable: a family that cannot be written down, such as one in Python.
@@ -101,7 +115,9 @@ def law_lines(described: UnboundFamily, family: Family, genes: Floats) -> tuple[
             f"Export: expected a PID, a Cascade or a StateFeedback, found a {type(described).__name__}, whose law is"
             " not known here; write its code by hand."
         )
-    return sheet.lines, sheet.memory
+    if sheet.missed is not None:
+        sheet.let(f"memory[{sheet.missed}]", "0.0")
+    return sheet
 
 
 def _state_feedback(sheet: _Sheet, described: StateFeedback, gains: dict[str, float]) -> None:
@@ -153,7 +169,7 @@ def _axes(sheet: _Sheet, described: PID | Cascade, gains: dict[str, float]) -> N
         if measured is None:
             last = sheet.remembered()
             moved = sheet.difference(led, f"state[{led}]", last)
-            slope = sheet.let(f"rate_{i}", f"{moved} / {dt!r} * {started}")
+            slope = sheet.let(f"rate_{i}", f"{moved} / ({dt!r} * {sheet.since()}) * {started}")
             sheet.let(last, f"state[{led}]")
         else:
             slope = f"state[{measured}]"
@@ -250,8 +266,10 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
     Raises:
         NotAvailable: a family that cannot be written down.
     """
-    lines, memory = law_lines(described, family, genes)
+    sheet = _sheet(described, family, genes)
+    lines, memory, missed = sheet.lines, sheet.memory, sheet.missed
     signals, rest = family.signals, _at_rest(described, family.signals)
+    repeating = "return self._repeated()"
     head = [
         f'"""A controller tuned by Twinloop {__version__}: one call of `command` a period of {signals.dt:g} s."""',
         "",
@@ -273,7 +291,7 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
         "    def command(self, state, target):",
         '        """What to send for the coming period, within the bounds, for a measured state and a target.',
         "",
-        *(f"        {line}" for line in _missing(signals, rest)),
+        *(f"        {line}" for line in _missing(signals, rest, missed)),
         '        """',
         "        for what, given in (('state', state), ('target', target)):",
         "            if len(given) != len(STATES):",
@@ -281,15 +299,18 @@ def controller_python(described: UnboundFamily, family: Family, genes: Floats) -
         "                raise ValueError(f\"command: {what}: expected {expected}, found {len(given)}\")",
         f"        memory, command = self._memory.copy(), [0.0] * {signals.n_u}",
         f"        if not finite([{', '.join(_read(lines))}]):",
-        "            return self._sent.copy()",
+        f"            {repeating}",
         "        try:",
         *body,
         "        except (ArithmeticError, ValueError):",
-        "            return self._sent.copy()",
-        "        if not (finite(memory) and finite(command)):",
-        "            return self._sent.copy()",
+        f"            {repeating}",
+        f"        if not finite([*memory, {', '.join(sheet.wanted)}]):",
+        f"            {repeating}",
         "        self._memory, self._sent = memory, command.copy()",
         "        return command", "",
+        "    def _repeated(self):",
+        *([] if missed is None else [f"        self._memory[{missed}] += 1.0"]),
+        "        return self._sent.copy()", "",
     ])  # fmt: skip
 
 
@@ -311,7 +332,8 @@ def controller_c(
     Raises:
         NotAvailable: a family that cannot be written down.
     """
-    lines, memory = law_lines(described, family, genes)
+    sheet = _sheet(described, family, genes)
+    lines, memory, missed = sheet.lines, sheet.memory, sheet.missed
     signals, big, rest = family.signals, name.upper(), _at_rest(described, family.signals)
     n_u = signals.n_u
     gains = [f"   {key} = {value!r}" for key, value in family.parameters(genes).items()]
@@ -331,7 +353,7 @@ def controller_c(
         f"}} {name}_memory;", "",
         "/* Forgets the run so far. */", f"void {name}_reset({name}_memory *memory_);", "",
         "/* What to send for the coming period, within the bounds, for a measured state and a target.", "",
-        *(f"   {line}" for line in _missing(signals, rest)),
+        *(f"   {line}" for line in _missing(signals, rest, missed)),
         "   Compile without -ffast-math, which takes every number for finite. */",
         f"{declared};", "", *END_C, "#endif", "",
     ])  # fmt: skip
@@ -344,13 +366,14 @@ def controller_c(
     text = "\n".join(body)
     helpers = [helper for key, helper in _c_helpers(precision).items() if f"{key}(" in text]
     read, usable = _read(lines), [f"all_finite(memory, {memory})"] if memory else []
-    usable.append(f"all_finite(command, {n_u})")
+    usable += [f"isfinite({wanted})" for wanted in sheet.wanted]
     source = "\n".join([
         f"/* Written by Twinloop {__version__}; see {name}.h. */", f'#include "{name}.h"', "", "#include <math.h>", "",
         "#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__",
         '#error "Compile this file without -ffast-math: a missing reading is NaN, and has to be seen."', "#endif", "",
         f"typedef {name}_real real;", "", *helpers, _FINITE,
-        f"static void repeated(const {name}_memory *memory_, real *command)", "{",
+        f"static void repeated({name}_memory *memory_, real *command)", "{",
+        *([] if missed is None else [f"    memory_->values[{missed}] += 1;"]),
         *_looped(n_u, "command[i] = memory_->sent[i];"), "}", "",
         declared, "{",
         f"    const real given[{len(read)}] = {{{', '.join(read)}}};",
@@ -368,8 +391,9 @@ def controller_c(
     return header, source
 
 
-def _missing(signals: Signals, rest: Sequence[float]) -> list[str]:
+def _missing(signals: Signals, rest: Sequence[float], missed: int | None) -> list[str]:
     """What becomes of a reading that is missing, for whoever calls the controller."""
+    rates = ["A rate that it makes of readings itself is then one over so many more periods."]
     before = ", ".join(
         f"{command.name} {value:g}" for command, value in zip(signals.commands, rest, strict=True)
     )
@@ -377,6 +401,7 @@ def _missing(signals: Signals, rest: Sequence[float]) -> list[str]:
         "Where a number that the law needs is not finite, as a missing reading is, it repeats its last command,",
         "and remembers nothing of the call; before the first usable reading it sends what it sends without any error:",
         f"{before}. It does so for as long as the reading is missing: stop the system if that lasts.",
+        *([] if missed is None else rates),
     ]
 
 
