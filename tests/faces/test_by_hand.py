@@ -463,6 +463,8 @@ def test_an_attached_flight_that_wraps_is_said_to_at_its_line(folder):
     said = run("attach", "rig.db", "wraps.csv")
     assert said.exit_code == 0
     assert f"Against this flight: angle jumps by a whole turn at line {row + 2}, {t[row]:g} s" in said.stderr
+    withdraw = "withdraw rig.db wraps.csv --reason WHY"
+    assert f"twinloop {withdraw}" in said.stderr and run(*withdraw.split()).exit_code == 0
 
 
 def test_what_speaks_against_a_flight_is_said_when_it_is_told(folder):
@@ -478,6 +480,8 @@ def test_what_speaks_against_a_flight_is_said_when_it_is_told(folder):
         "Against this flight: The commands recorded of test 0 are none that its controller gives"
         in told.stderr
     )
+    withdraw = "withdraw rig.db 0 --reason WHY"
+    assert f"take it back, and tell the right one: twinloop {withdraw}" in told.stderr
     assert flight.steps == look().experiments[0].trajectory.steps
     again = run("tell", "rig.db", "0", "flight.csv", "--json")
     assert json.loads(again.stdout)["remarks"] == [] and again.stderr == ""

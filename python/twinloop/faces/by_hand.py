@@ -205,7 +205,7 @@ def tell(
         }
         remarks = [] if read is None else against_it(campaign, runs[-1], asked, read)
         answer({**_standing(campaign, asked), **quality, "remarks": remarks}, text, as_json)
-        _say(remarks)
+        _say(campaign, remarks, test)
 
 
 def _told(
@@ -261,7 +261,7 @@ def attach(store: str, flight: Path, name: str | None, as_json: bool) -> None:
         answer(
             {"file": str(flight), "experiments": len(campaign.experiments), "remarks": remarks}, text, as_json
         )
-        _say(remarks)
+        _say(campaign, remarks, flight)
 
 
 @click.command()
@@ -278,10 +278,13 @@ def abandon(store: str, test: int, name: str | None, as_json: bool) -> None:
         answer(_standing(campaign, asked), text, as_json)
 
 
-def _say(remarks: Sequence[str]) -> None:
-    """Says what speaks against a flight at once, while somebody can still look at the rig."""
+def _say(campaign: Campaign, remarks: Sequence[str], which: int | Path) -> None:
+    """Says what speaks against a flight at once, while somebody can still look at the rig, and how to take it back."""
     for line in said_against(remarks):
         click.echo(line, err=True)
+    withdraw = next_command(campaign, "withdraw", which, "--reason", "WHY")
+    if remarks and not any(" withdraw " in remark for remark in remarks):
+        click.echo(f"If its log is wrong, take it back, and tell the right one: {withdraw}", err=True)
 
 
 def _standing(campaign: Campaign, test: Test) -> dict[str, object]:
