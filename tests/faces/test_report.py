@@ -199,7 +199,7 @@ def test_the_page_needs_no_network_and_is_small(page):
 
 def test_the_spread_of_a_test_that_waits_is_no_power_of_ten(good, monkeypatch):
     test = SimpleNamespace(number=4, predicted=212.6, spread=99.7, risk=0.028, reason="Because.")
-    monkeypatch.setattr(tl.Campaign, "waiting", property(lambda campaign: (test,)))
+    monkeypatch.setattr("twinloop.faces.report.page.awaited", lambda campaign: [test])
     text = "".join(Elements(report_page(good, "pendulum", {"name": "a pendulum"}, {})).text)
     assert "Test 4 waits to be flown: quality 212.6 ± 100 predicted, risk " in text
     assert "risk not estimated" not in text

@@ -14,6 +14,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats, number
 from twinloop._ground.elementary import cos, exp, log, sin
+from twinloop._ground.texts import text
 from twinloop.autopilots.files import EVERY_NODE, FORMATS, Set
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.signals import Signals
@@ -70,10 +71,7 @@ class Sweep:
 
     def __post_init__(self) -> None:
         for name in ("command", "axis"):
-            if not isinstance(getattr(self, name), str):
-                raise InvalidInput(
-                    f"Sweep, {name}: expected a text such as 'rate roll', found {getattr(self, name)!r}."
-                )
+            text(f"Sweep, {name}", getattr(self, name))
         for name in ("amplitude", "first", "duration", "scale"):
             object.__setattr__(self, name, number(f"Sweep, {name}", getattr(self, name), above=0.0))
         for name in ("last", "fade_in", "fade_out"):

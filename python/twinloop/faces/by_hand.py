@@ -282,8 +282,8 @@ def _say(campaign: Campaign, remarks: Sequence[str], which: int | Path) -> None:
     """Says what speaks against a flight at once, while somebody can still look at the rig, and how to take it back."""
     for line in said_against(remarks):
         click.echo(line, err=True)
-    withdraw = next_command(campaign, "withdraw", which, "--reason", "WHY")
     if remarks and not any(" withdraw " in remark for remark in remarks):
+        withdraw = next_command(campaign, "withdraw", which, "--reason", "WHY")
         click.echo(f"If its log is wrong, take it back, and tell the right one: {withdraw}", err=True)
 
 

@@ -114,8 +114,8 @@ def work(
         max_risk: probability of leaving the envelope above which a test is not flown; None: any.
 
     Returns:
-        The exit code: 130 after an interruption, 1 where no controller is fit to fly, a test was too risky, or the
-        system did not answer in time, or raised.
+        The exit code: 130 after an interruption, 1 where no controller is fit to fly, nothing was flown to learn from,
+        a test was too risky, or the system did not answer in time, or raised.
 
     Raises:
         KeyboardInterrupt: an interruption before there was a result.

@@ -156,8 +156,7 @@ class _Led(Family):
         self, genes: ArrayLike, excitation: ArrayLike | None = None, hold_back: HoldBack | None = None
     ) -> Controller:
         """He, for one run."""
-        plain = super().controller(genes, excitation, hold_back)
-        return _AsRead(self, plain.genes, plain.excitation)
+        return _AsRead(self, floats("Genes", genes, (self.size,)))
 
 
 class _AsRead(Controller):

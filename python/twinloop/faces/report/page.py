@@ -165,9 +165,8 @@ def _figures(found: Examination, names: Sequence[str]) -> list[Figure]:
 def _next(campaign: Campaign, result: Mapping[str, Any]) -> dict[str, object]:
     """What is waiting to be flown, and what another flight would bring."""
     known = "advice" in result and result["advice"]["gain"] is not None
-    waiting = {test.number: test for test in (*awaited(campaign), *campaign.waiting)}
     return {
-        "waiting": list(waiting.values()),
+        "waiting": awaited(campaign),
         "words": advice_words(result) if known else "",
         "flights": campaign.setup.predicted_flights,
     }

@@ -66,8 +66,8 @@ class _Sheet:
     def since(self) -> str:
         """Periods since the last call that was remembered."""
         if self.missed is None:
-            self.missed = self.memory
-            self.memory += 1
+            self.remembered()
+            self.missed = self.memory - 1
         return f"(1.0 + memory[{self.missed}])"
 
     def difference(self, state: int, a: str, b: str) -> str:
@@ -393,7 +393,6 @@ def controller_c(
 
 def _missing(signals: Signals, rest: Sequence[float], missed: int | None) -> list[str]:
     """What becomes of a reading that is missing, for whoever calls the controller."""
-    rates = ["A rate that it makes of readings itself is then one over so many more periods."]
     before = ", ".join(
         f"{command.name} {value:g}" for command, value in zip(signals.commands, rest, strict=True)
     )
@@ -401,7 +400,11 @@ def _missing(signals: Signals, rest: Sequence[float], missed: int | None) -> lis
         "Where a number that the law needs is not finite, as a missing reading is, it repeats its last command,",
         "and remembers nothing of the call; before the first usable reading it sends what it sends without any error:",
         f"{before}. It does so for as long as the reading is missing: stop the system if that lasts.",
-        *([] if missed is None else rates),
+        *(
+            []
+            if missed is None
+            else ["A rate that it makes of readings itself is then one over so many more periods."]
+        ),
     ]
 
 
