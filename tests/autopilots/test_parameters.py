@@ -150,6 +150,15 @@ def test_no_node_breaks_out_of_its_line(node):
     )
 
 
+@pytest.mark.parametrize(
+    "word", ["y", "N", "Yes", "no", "on", "OFF", "true", "False", "null", "only", "gains.on"]
+)
+def test_a_word_that_yaml_takes_for_a_value_stays_a_name(word):
+    node = word.replace(".", "/")
+    text = Autopilot("ros2", {"roll.kp": Parameter(word)}, node).text({"roll.kp": 1.5}, "x")
+    assert yaml.safe_load(text) == {node: {"ros__parameters": {word: 1.5}}}
+
+
 def test_every_gain_has_a_parameter_and_every_parameter_a_gain():
     pilot = Autopilot("px4", {"a": Parameter("A"), "b": None})
     assert pilot.values({"a": 1.0, "b": 0.0}) == {"A": 1.0}

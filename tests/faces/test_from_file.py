@@ -111,7 +111,7 @@ def test_where_all_flights_failed_it_is_said_why_and_how_to_go_on_and_nobody_was
     assert run(*withdraw.split()).exit_code == 0
     # A run that was taken back is spent until its test is told anew.
     spent = run("resume", "rig.db", "--threads", "1")
-    assert spent.exit_code == 1 and "all 1 runs are spent" in spent.stderr and resume in spent.stderr
+    assert spent.exit_code == 1 and "its only run is spent" in spent.stderr and resume in spent.stderr
     done = run(*resume.split(), "--threads", "1")
     assert done.exit_code == 0 and len(flights("rig.db")) == 2, done.output
 
@@ -211,6 +211,33 @@ def test_a_rig_whose_code_raises_in_its_first_flight_leaves_a_sentence_and_no_tr
     assert stopped.exit_code == 1 and stopped.stdout == "" and isinstance(stopped.exception, SystemExit)
     assert "found FileNotFoundError in raises.py, line 9" in stopped.stderr
     assert "Test waiting to be flown: 0." in run("show", "rig.db").stdout
+
+
+USELESS = """
+import rig
+
+def useless():
+    system = rig.rig()
+    plain = system.run
+    def run(test):
+        flight = plain(test)
+        return None if test.number == {number} else flight
+    system.run = run
+    return system
+"""
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_rig_that_answers_with_nothing_is_named_and_its_test_waits(folder, monkeypatch, number):
+    monkeypatch.delitem(sys.modules, "useless", raising=False)
+    (folder / "useless.py").write_text(USELESS.format(number=number), encoding="utf-8")
+    written(folder, PENDULUM, section("useless:useless"))
+    stopped = run("run", "rig.toml", "--experiments", "2", "--threads", "1")
+    assert stopped.exit_code == 1 and isinstance(stopped.exception, SystemExit)
+    assert "System 'useless:useless', what it answered. " in stopped.stderr and "found None" in stopped.stderr
+    assert "nothing is lost" in stopped.stderr and "Continue with: twinloop resume rig.db" in stopped.stderr
+    assert f"Test waiting to be flown: {number}." in run("show", "rig.db").stdout
+    assert ("1 experiment" in stopped.stdout) == (number == 1)
 
 
 FAILS = """

@@ -19,6 +19,8 @@ REAL_32, INT_32 = 9, 6
 """Types of parameters in MAVLink."""
 EVERY_NODE = "/**"
 NODE = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+NO_NAMES = re.compile(r"y|n|yes|no|on|off|true|false|null", re.IGNORECASE)
+"""Words that YAML reads as a truth value or as nothing where they are not quoted."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,10 @@ def _betaflight(values: Set, node: str) -> str:
 
 
 def _ros2(values: Set, node: str) -> str:
-    rows = (f"    {name}: {value if whole else _yaml(value)}\n" for name, (value, whole) in values.items())
-    return f"{node}:\n  ros__parameters:\n{''.join(rows)}"
+    rows = (
+        f"    {_key(name)}: {value if whole else _yaml(value)}\n" for name, (value, whole) in values.items()
+    )
+    return f"{_key(node)}:\n  ros__parameters:\n{''.join(rows)}"
 
 
 def _json(values: Set, node: str) -> str:
@@ -176,6 +180,11 @@ class Autopilot:
 def _short(value: Value) -> str:
     """The shortest text that single precision reads back."""
     return str(value) if isinstance(value, int) else np.format_float_positional(np.float32(value), trim="0")
+
+
+def _key(name: str) -> str:
+    """A name that YAML reads as one."""
+    return f'"{name}"' if NO_NAMES.fullmatch(name) else name
 
 
 def _yaml(value: Value) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from traceback import walk_tb
 from typing import TYPE_CHECKING
 
 from twinloop._ground.arrays import share, whole
@@ -215,6 +216,16 @@ def _record(campaign: Campaign, test: Test, landed: list[Trajectory]) -> None:
             _enter(campaign, test, trajectory)
         except StoreFailure as failure:
             raise StoreFailure(f"{failure} {rescued(test, trajectory)}") from failure
+
+
+def refused_an_answer(reason: BaseException) -> bool:
+    """Whether it was what the system answered that could not be entered; its test still waits.
+
+    Args:
+        reason: that came out of `campaign.run`.
+    """
+    entered = any(frame.f_code is _enter.__code__ for frame, _ in walk_tb(reason.__traceback__))
+    return entered and isinstance(reason, InvalidInput)
 
 
 def _enter(campaign: Campaign, test: Test, trajectory: Trajectory) -> None:

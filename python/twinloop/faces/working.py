@@ -12,6 +12,7 @@ import click
 from twinloop._ground.arrays import number
 from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign.flying import refused_an_answer
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky, TwinloopError
 from twinloop.faces.answering import next_command
@@ -131,9 +132,10 @@ def work(
                 click.echo(f"twinloop: {reason}", err=True)
                 stopped = True
             except Exception as reason:
-                if isinstance(reason, TwinloopError) or not raised_in_a_run(reason):
+                said = _fault_of(name, reason, campaign.store is not None)
+                if said is None:
                     raise
-                click.echo(f"twinloop: {_raised_by(name, reason, campaign.store is not None)}", err=True)
+                click.echo(f"twinloop: {said}", err=True)
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
             ended = True
@@ -162,15 +164,20 @@ def work(
     return 130 if campaign.interrupted else 1 if stopped or result["controller"] is None else 0
 
 
-def _raised_by(name: str, reason: Exception, kept: bool) -> str:
-    """That the code of a system raised, and what becomes of the test that it was to fly."""
+def _fault_of(name: str, reason: Exception, kept: bool) -> str | None:
+    """What the code of a system did wrong, and what becomes of the test that it was to fly; None: nothing."""
     waits = "The test still waits and nothing is lost: correct that, then go on." if kept else "Correct that."
+    if refused_an_answer(reason):
+        return f"System {name!r}, what it answered. {reason} {waits}"
+    if isinstance(reason, TwinloopError) or not raised_in_a_run(reason):
+        return None
     return f"System {name!r}: expected a run, found {raised(reason)}. {waits}"
 
 
 def _nothing_flown(campaign: Campaign, experiments: int) -> str:
     """That nothing was flown that something can be learnt from, why, and what to do."""
-    found, again = f"all {experiments} runs are spent", "Begin again with another controller that you trust."
+    found = "its only run is spent" if experiments == 1 else f"all {experiments} runs are spent"
+    again = "Begin again with another controller that you trust."
     if campaign.store is not None:
         again = f"Go on with more: {next_command(campaign, 'resume', '--experiments', campaign.runs + 1)}"
     if campaign.failures:
