@@ -45,7 +45,7 @@ FRONTS = {
         "apart at_once bare contacts exponentials friction gaps hidden lags parts second_look storage terms undisturbed"
     ),
     "identification/search": (
-        "behind_a_law directions drives hidden masses moderation noise problem selection structure walks"
+        "behind_a_law directions drives hidden masses moderation noise problem screen selection structure walks"
     ),
     "identification/sensors": "chains euler_steps noise offsets reported",
     "identification/terms": (

@@ -17,10 +17,11 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.proposals.storage import AT_ONCE, Screen, shows, storage
+from twinloop.identification.proposals.storage import shows, storage
 from twinloop.identification.records import Run, stages
 from twinloop.identification.search.moderation import precisions
 from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.screen import AT_ONCE, Screen
 from twinloop.identification.starts import starts
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 

@@ -9,6 +9,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.proposals.lags import without_lags
 from twinloop.identification.search.drives import drive
 from twinloop.identification.search.noise import first_noise, still
 from twinloop.identification.search.problem import Problem
@@ -17,7 +18,6 @@ from twinloop.identification.search.structure import search
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, begun, damped, entered, hinges, limits
 from twinloop.identification.terms.libraries import periodic
-from twinloop.law.actuation import Actuation
 
 NEAR = 10.0
 """Units of χ² by which a subset may be worse than the best whose hinges are looked at more closely."""
@@ -33,7 +33,7 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if problem.priors.bounds:
         return
     quiet = still(problem, (found.chain for found in hypothesis.sums))
-    bases = [] if quiet and hypothesis.fit.stable else [hypothesis, *_without_lags(context, hypothesis)]
+    bases = [] if quiet and hypothesis.fit.stable else [hypothesis, *without_lags(context, hypothesis)]
     # Terms of higher rungs and evolved ones may stand in for what begins at a place: it is looked for beside few terms.
     rigid = context.signals.kinematics is not None
     if not bases and context.several and not rigid and hypothesis.beside_few:
@@ -94,10 +94,3 @@ def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) 
     return [
         places[term] for term in dict.fromkeys(term for subset in near for term in subset) if term in places
     ]
-
-
-def _without_lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """The same with commands that act at once, if any do not: a lag may have stood in for what a contact does."""
-    actuation, at_once = hypothesis.actuation, Actuation.direct(context.signals)
-    if context.may_lag and actuation.actuators != at_once.actuators:
-        yield replace(hypothesis, actuation=replace(actuation, actuators=at_once.actuators))

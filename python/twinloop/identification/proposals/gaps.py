@@ -19,10 +19,12 @@ from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.fit.promises import promises
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.proposals.storage import Screen, Sources, at_once, shows
+from twinloop.identification.proposals.lags import without_lags
+from twinloop.identification.proposals.storage import shows
 from twinloop.identification.search.masses import masses_behind
 from twinloop.identification.search.noise import first_noise, still
 from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.screen import Screen, Sources
 from twinloop.identification.search.structure import Sum, prices, usable_among, weighed
 from twinloop.identification.terms.friction import entered, frictions
 from twinloop.law.actuation import HiddenState
@@ -67,7 +69,7 @@ def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
     # A lag may have stood in for what a mass does, so commands that act at once come first.
     numbers = itertools.count(SCREENS)
-    for variant in (*at_once(context, bare), bare):
+    for variant in (*without_lags(context, bare), bare):
         screen, short = Screen.of(context, variant, next(numbers)), _short(variant)
         looked = screen if short is variant else Screen.of(context, short, next(numbers))
         for place in rates:

@@ -62,6 +62,18 @@ def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         yield from_both_sides(context, best, best.sums)
 
 
+def without_lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The same with commands that act at once, if any do not: a lag may have stood in for what another proposal finds.
+
+    Args:
+        context: of the identification.
+        hypothesis: with commands that may lag.
+    """
+    actuation, direct = hypothesis.actuation, Actuation.direct(context.signals)
+    if context.may_lag and actuation.actuators != direct.actuators:
+        yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
+
+
 def _searched(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
     """The best so far, or a better one with another lag or delay of a group."""
     for delay in range(context.options.longest_delay + 1):
