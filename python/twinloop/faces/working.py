@@ -11,8 +11,7 @@ import click
 
 from twinloop._ground.arrays import number
 from twinloop._ground.writing import write_whole
-from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.flying import refused_an_answer
+from twinloop.campaign import Campaign, controller_to_fly, refused_an_answer
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky, TwinloopError
 from twinloop.faces.answering import next_command
