@@ -101,7 +101,7 @@ def _held_out(results: Results, system: str, learners: Sequence[str]) -> Table:
         " are of ranks, in which a run that diverges comes last. The last column: how many of the 100 diverge, median"
         " over seeds, for each of the columns before, or for all of them.",
     )
-    head = [*_headed("after Υ0 +", columns), "of 100 diverge"]
+    head = [*_headed(columns), "of 100 diverge"]
     return Table(f"{system}: normalised error on held-out controllers", head, rows, notes)
 
 
@@ -153,7 +153,7 @@ def _controllers(results: Results, system: str, learners: Sequence[str]) -> Tabl
         f"Doing nothing: {judged.nothing:.3g}. C0: {_plain(spread(first))}. Optimum (CMA-ES on the true"
         f" system): {_plain(spread(best))}.",
     ]
-    return Table(f"{system}: controller to fly", _headed("after Υ0 +", columns), rows, notes)
+    return Table(f"{system}: controller to fly", _headed(columns), rows, notes)
 
 
 def _conduct(results: Results, system: str, learners: Sequence[str]) -> Table:
@@ -245,8 +245,8 @@ def _columns(results: Results, system: str, learners: Sequence[str]) -> list[int
     return [k for k in COLUMNS if k in measured]
 
 
-def _headed(first: str, columns: Sequence[int]) -> list[str]:
-    return [first, *(str(k) for k in columns)]
+def _headed(columns: Sequence[int]) -> list[str]:
+    return ["after Υ0 +", *(str(k) for k in columns)]
 
 
 def _spread_cell(found: Spread | None, failed: int) -> str:

@@ -1,9 +1,10 @@
-"""Judging in turn: each draw of noise and of disturbances on one of the members."""
+"""Judging: each draw on every member or on one of them in turn, without noise, and a test as it was flown."""
 
 import numpy as np
 import pytest
 
-from committees import STEPS, TUNED, committee_of, planner_of, signals
+import twinloop as tl
+from committees import STEPS, TUNED, committee_of, member, planner_of, signals
 from oracles import same_bits
 
 GENES = np.stack([TUNED, [3.0, 0.0, 1.0]])
@@ -33,3 +34,29 @@ def test_in_calm_and_where_there_are_fewer_draws_than_members_each_member_meets_
     alone = committee.members[:1]
     every = planner.judge(alone, GENES, committee.sds, 5)
     assert same_bits(planner.judge_in_turn(alone, GENES, committee.sds, 5, None).qualities, every.qualities)
+
+
+def test_a_quiet_flight_knows_no_noise():
+    planner, committee = planner_of(signals()), committee_of(signals())
+    quiet = planner.quiet(committee.members, GENES)
+    assert quiet.qualities.shape == (3, 1, 2)
+    drawn = planner.judge(committee.members, GENES, 1e-9 * committee.sds, 5)
+    assert np.allclose(drawn.qualities, quiet.qualities, rtol=1e-6)
+    noisy = planner.judge(committee.members, GENES, 20.0 * committee.sds, 5)
+    assert not np.allclose(noisy.qualities, quiet.qualities, rtol=1e-3)
+
+
+def test_a_test_as_it_was_flown_has_its_excitation_and_the_members_that_last():
+    planner, committee = planner_of(signals()), committee_of(signals())
+    excitation = 0.05 * np.sin(np.arange(STEPS))[:, np.newaxis]
+    plain = tl.Test(planner.family, TUNED, planner.task.initial_state, planner.task.target_state, STEPS)
+    excited = tl.Test(
+        planner.family, TUNED, planner.task.initial_state, planner.task.target_state, STEPS, excitation
+    )
+    for test, added in ((plain, None), (excited, excitation[np.newaxis])):
+        members, judged = planner.as_flown(committee.members, test, committee.sds, 4)
+        alone = planner.judge(members, TUNED[np.newaxis], committee.sds, 4, added, measured=True)
+        assert members == list(committee.members) and same_bits(judged.qualities, alone.qualities)
+    runaway = [*committee.members, member(signals(), 1.0, damping=-60.0)]
+    members, judged = planner.as_flown(runaway, excited, committee.sds, 4)
+    assert members == list(committee.members) and same_bits(judged.qualities, alone.qualities)

@@ -65,6 +65,16 @@ def measured(book: Logbook, test: int) -> float | None:
     return math.fsum(values) / len(values) if values else None
 
 
+def measured_on_task(book: Logbook, test: Test) -> float | None:
+    """Quality of a test of the campaign's own task on the system, as by `measured`; None of another task.
+
+    Args:
+        book: of the campaign.
+        test: of it.
+    """
+    return measured(book, test.number) if on_task(book, test) else None
+
+
 def best_flown(book: Logbook) -> Test | None:
     """The flown test of the best quality; the first one if no run was complete, None if no test was flown.
 

@@ -32,6 +32,8 @@ LATER = "[k+1]"
 """Behind a state: a period later."""
 LONG_NAME = 32
 """Columns of a left side above which lines that go on do not begin under its equals sign."""
+DIGITS = 4
+"""Significant digits of the constants of one expression on one line."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class Equations:
             spreads(self.expressions, polynomial, [polynomials[output] for polynomials in of_members])
             for output, polynomial in enumerate(self.polynomials if self.members else ())
         ]
-        prefix = _unused("t", law.symbols)
+        prefix = _unused(law.symbols)
         self.writer = Writer(self.expressions, self.outputs, law.symbols, digits, prefix, self.exact)
 
     # The legend
@@ -221,7 +223,7 @@ class Equations:
         if law.form in DERIVATIVES:
             driven, slopes = self.signals.driven, dict(enumerate(law.derivatives()))
             given = [node for place, node in slopes.items() if place not in driven]
-            prefix = _unused("t", [*law.symbols, *self.writer.names.values()])
+            prefix = _unused([*law.symbols, *self.writer.names.values()])
             kinematics = Writer(law.expressions, given, law.symbols, EXACT, prefix, False)
             lines += _named(kinematics)
             for place, name in enumerate(names):
@@ -367,28 +369,28 @@ def _comment(text: str, indent: int = 0) -> list[str]:
     return textwrap.wrap(text, WIDTH - indent, initial_indent="# ", subsequent_indent="#   ")
 
 
-def _unused(prefix: str, taken: Sequence[str]) -> str:
+def _unused(taken: Sequence[str]) -> str:
     """A prefix with which no name is made that is taken."""
+    prefix = "t"
     while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in taken):
         prefix += "_"
     return prefix
 
 
-def readable(expressions: Expressions, number: int, symbols: Sequence[str], digits: int = 4) -> str:
+def readable(expressions: Expressions, number: int, symbols: Sequence[str]) -> str:
     """One expression on one line, multiplied out.
 
     Args:
         expressions: where it is.
         number: its node.
         symbols: a name for each input, by its place.
-        digits: significant digits of constants.
     """
     target = Expressions()
     for place in range(len(symbols)):
         target.input(place)
     root = written(target, Expansion(expressions, target)[number])
     endless = replace(TEXT, longest=sys.maxsize, worth=sys.maxsize)
-    return Writer(target, [root], symbols, digits, "t", False, endless).text(root)
+    return Writer(target, [root], symbols, DIGITS, "t", False, endless).text(root)
 
 
 def _all_alike(members: Sequence[Law]) -> bool:

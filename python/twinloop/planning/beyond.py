@@ -32,6 +32,6 @@ def bears_ending(
     """
     if committee.ending is None:
         return np.ones(len(genes), dtype=np.bool_)
-    flights = judge.judge([committee.ending], genes, committee.sds, 1, excitation, ends)
+    flights = judge.quiet([committee.ending], genes, excitation, ends)
     kept: NDArray[np.bool_] = flights.worst_usage <= 1.0 - margin
     return kept

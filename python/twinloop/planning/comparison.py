@@ -57,7 +57,7 @@ class Comparison:
         self.drafts, self.flown, self.wanted = drafts, flown, wanted
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
         reach = reach_of(flown, wanted, options)
-        everyone = judge.judge(committee.members, genes, committee.sds, 1, excitation, ends)
+        everyone = judge.quiet(committee.members, genes, excitation, ends)
         # A member that diverges whatever is flown is no member (E-SINDy). Nor is one that goes too far whatever is
         # flown, the best gains flown among them: it would forbid all flights.
         heeded = everyone.stable & (everyone.usages[:, 0] <= reach).any(axis=1)
@@ -154,9 +154,7 @@ class Comparison:
         """Candidates that keep the envelope with more delay than was seen; all of them where none does."""
         drafts, bears = self.drafts, np.ones_like(self.possible)
         if self.committee.delayed:
-            flights = self.judge.judge(
-                self.committee.delayed, drafts.genes, self.committee.sds, 1, drafts.excitation, drafts.ends
-            )
+            flights = self.judge.quiet(self.committee.delayed, drafts.genes, drafts.excitation, drafts.ends)
             bears = ~outside(flights.worst_usage)
             # Gains that have flown need not show it.
             bears[drafts.repeats :] |= self.flown.flies
@@ -196,7 +194,7 @@ class Comparison:
         stream = judge.unit.part(self.wanted.number, 1).stream("candidates")
         drawn = judge.family.from_unit(stream.uniforms(ANYWHERE, judge.family.size))
         genes = self.committee.as_flown(drawn, self.flown.best)
-        return apart(judge.judge(self.members, genes, np.zeros(judge.signals.n_x), 1).qualities[:, 0])
+        return apart(judge.quiet(self.members, genes).qualities[:, 0])
 
     def _noise_of_tuned(self) -> tuple[float, float]:
         """Of the tuned flight: how far its quality is from that of the next, and what noise adds to a measurement."""
@@ -205,7 +203,7 @@ class Comparison:
         true, measured = (judge(self.members, genes, sds, draws, measured=how) for how in (False, True))
         if not np.isfinite(true.qualities).all():
             return 0.0, 0.0
-        quiet = judge(self.members, genes, sds, 1)
+        quiet = self.judge.quiet(self.members, genes)
         return float(true.qualities[0].std()), max(0.0, float(measured.mean[0] - quiet.mean[0]))
 
     def _noisy(self, chosen: list[int]) -> Judged:

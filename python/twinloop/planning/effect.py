@@ -36,7 +36,7 @@ def gains_count(judge: Judge, members: Sequence[_core.Model], untunable: Sequenc
     corners = np.repeat([[0.0], [0.5], [1.0]], family.size, axis=1)
     corners[:, list(untunable)] = 0.5
     places = np.stack([family.from_unit(corner) for corner in corners])
-    qualities = judge.judge(members, places, np.zeros(judge.signals.n_x), 1).qualities
+    qualities = judge.quiet(members, places).qualities
     return bool((~np.isfinite(qualities) | (qualities != qualities[:, :, :1])).any())
 
 
@@ -80,7 +80,7 @@ def without_effect(judge: Judge, members: Sequence[_core.Model], beside: Floats)
         ends = family.from_unit(np.full(family.size, place))
         genes[end, np.arange(family.size), np.arange(family.size)] = ends
     every = np.concatenate([beside[np.newaxis], *genes])
-    qualities = judge.judge(members, every, np.zeros(judge.signals.n_x), 1).qualities
+    qualities = judge.quiet(members, every).qualities
     moved = (qualities != qualities[:, :, :1]).any(axis=(0, 1))[1:].reshape(2, family.size).any(axis=0)
     return tuple(np.flatnonzero(~moved).tolist())
 

@@ -35,7 +35,7 @@ def stand_for_failed(
     same = nearby(judge.family, genes, failed)
     if not len(failed) or same.all():
         return same
-    flights = judge.judge(members, np.concatenate([genes, np.stack(failed)]), np.zeros(judge.signals.n_x), 1)
+    flights = judge.quiet(members, np.concatenate([genes, np.stack(failed)]))
     # Members on which the failure diverges tell nothing of it but that.
     every = np.stack([flights.qualities[:, 0], flights.usages[:, 0]])
     mine, theirs = every[:, :, : len(genes)], every[:, :, len(genes) :]

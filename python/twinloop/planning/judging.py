@@ -251,11 +251,39 @@ class Judge:
         offsets = (
             None if off is None else off * self.unit.part(0).stream("off_start").normals(draws, len(off))
         )
-        values, usages = qualities(
-            members, self.flights(genes, excitation, ends, hold_back), self.quality.engine, self.signals,
-            noise=noise, offsets=offsets, disturbances=disturbances, measured=measured, workers=self.workers,
-        )  # fmt: skip
-        return Judged(values, usages)
+        flights = self.flights(genes, excitation, ends, hold_back)
+        return self._judged(members, flights, noise, disturbances, offsets=offsets, measured=measured)
+
+    def quiet(
+        self,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        excitation: Floats | None = None,
+        ends: Ends | None = None,
+    ) -> Judged:
+        """Flies candidates on members once, without noise, as for `judge`."""
+        return self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
+
+    def as_flown(
+        self, members: Sequence[_core.Model], test: Test, sds: Floats, draws: int
+    ) -> tuple[list[_core.Model], Judged]:
+        """Flies a test as it was flown, under noise.
+
+        Args:
+            members: of a committee.
+            test: with its excitation, and what held that back.
+            sds: of each state's sensor (n_x,).
+            draws: of the noise.
+
+        Returns:
+            Members that last, for one that diverges in a flight that went to its end says nothing of how good it was;
+            and the qualities that records of its flights on them would give.
+        """
+        genes = test.genes[np.newaxis]
+        excitation = None if test.excitation is None else test.excitation[np.newaxis]
+        lasting = self.stable_members(members, genes, excitation)
+        judged = self.judge(lasting, genes, sds, draws, excitation, measured=True, hold_back=test.hold_back)
+        return lasting, judged
 
     def judge_in_turn(
         self,
@@ -289,14 +317,13 @@ class Judge:
             return None if every_draw is None else every_draw[number::every]
 
         found = [
-            qualities(
-                [member], flights, self.quality.engine, self.signals,
-                noise=drawn(noise, i), disturbances=drawn(disturbances, i), workers=self.workers,
-            )
+            self._judged([member], flights, drawn(noise, i), drawn(disturbances, i))
             for i, member in enumerate(members)
-        ]  # fmt: skip
-        values, usages = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
-        return Judged(values, usages)
+        ]
+        return Judged(
+            np.concatenate([each.qualities for each in found], axis=1),
+            np.concatenate([each.usages for each in found], axis=1),
+        )
 
     def judge_within(
         self,
@@ -323,8 +350,7 @@ class Judge:
         ends: Ends | None = None,
     ) -> list[_core.Model]:
         """Members that diverge on fewer than half of the flights; the best one in any case."""
-        judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
-        return list(compress(members, judged.stable))
+        return list(compress(members, self.quiet(members, genes, excitation, ends).stable))
 
     def noise(self, sds: Floats, draws: int, reports: Reports) -> Floats | None:
         """The same draws of sensor noise for everybody, as it is given (draws, n + 1, n_x); None for a quiet flight."""
@@ -347,4 +373,22 @@ class Judge:
         return candidates(
             self.family, genes, initial, target, self.task.steps,
             excitation=excitation, hold_back=hold_back, limits=self.limits,
+        )  # fmt: skip
+
+    def _judged(
+        self,
+        members: Sequence[_core.Model],
+        flights: _core.Flights,
+        noise: Floats | None,
+        disturbances: Floats | None,
+        *,
+        offsets: Floats | None = None,
+        measured: bool = False,
+    ) -> Judged:
+        """Flights on members, each under every draw of what is given."""
+        return Judged(
+            *qualities(
+                members, flights, self.quality.engine, self.signals,
+                noise=noise, offsets=offsets, disturbances=disturbances, measured=measured, workers=self.workers,
+            )
         )  # fmt: skip

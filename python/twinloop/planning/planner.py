@@ -157,7 +157,7 @@ class Planner(Judge):
             flown: so far.
         """
         one, options = genes[np.newaxis], self.options
-        usage = self.judge(committee.members, one, committee.sds, 1).worst_usage
+        usage = self.quiet(committee.members, one).worst_usage
         reach = reach_of(flown, Wanted("control", 0, exploit=True, last=True), options)
         return bool((usage <= reach).all() and bears_ending(self, committee, options.margin, one).all())
 

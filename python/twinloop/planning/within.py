@@ -48,7 +48,7 @@ def tune_within(
     Returns:
         Those of the least excess where none stays within.
     """
-    most, nothing = 1.0 - options.margin, np.zeros(judge.signals.n_x)
+    most = 1.0 - options.margin
     unit = float(judge.judge_within(bounds, members, starts[0][np.newaxis]).mean_of_finite[0])
 
     def score(asked: Floats) -> Floats:
@@ -57,7 +57,7 @@ def tune_within(
         lost, excess = near.lost, np.maximum(0.0, near.finite.worst_usage - most)
         excess = excess + beyond_halfway(judge.family, genes, starts[0], disproved)
         if committee.delayed:
-            late = judge.judge(committee.delayed, genes, nothing, 1)
+            late = judge.quiet(committee.delayed, genes)
             lost = lost + late.lost
             excess = excess + np.maximum(0.0, late.finite.worst_usage - most)
         return scores_of(lost, near.mean_of_finite, excess, unit)

@@ -11,7 +11,7 @@ from conftest import PENDULUM_GAINS
 from logged_flights import of_quadrotor
 from twinloop.campaign.data.readings import froze, ratio
 from twinloop.campaign.data.reports import derived, repeats
-from twinloop.campaign.data.sent import exchanged, exchanged_with_state, other_commands
+from twinloop.campaign.data.sent import change_that_rights, exchanged, other_commands
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of, distinct
 from twinloop.campaign.identify_and_plan.elsewhere import Elsewhere
@@ -218,10 +218,10 @@ def test_a_command_exchanged_with_a_state_is_found_and_both_are_named(new_campai
         found = tl.Trajectory(run.t, states, commands)
         return SimpleNamespace(test=test, replayed=test, number=0, trajectory=found, off_start=())
 
-    assert exchanged_with_state(flight(run.states, run.commands)) is None
-    assert exchanged_with_state(flight(run.states, -run.commands)) is None
+    assert other_commands([flight(run.states, run.commands)]) == []
+    assert "exchanged" not in change_that_rights(flight(run.states, -run.commands))
     wrong = flight(states, commands)
-    assert exchanged_with_state(wrong) == (state, "torque") and other_commands([wrong]) == [0]
+    assert change_that_rights(wrong) == f"{state} and torque exchanged" and other_commands([wrong]) == [0]
     (sentence,) = (
         each.sentence for each in against(wrong, test, test.signals) if each.code == "other-commands"
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from twinloop.identification.terms.denominators import RUNG, Denominator, alone, over, quotient
+from twinloop.identification.terms.denominators import FIRST_RUNG, Denominator, alone, over, quotient
 from twinloop.identification.terms.joints import solution
 from twinloop.identification.terms.pool import Pool
 
@@ -37,7 +37,7 @@ def test_a_term_over_a_state_alone_is_one_where_it_was_made_as_such_not_where_th
         node = over(pool, 1, single)
         assert pool.values([node], np.array([[3.0, 5.0, 0.0]])) == 5.0 / 1.5**power
         assert quotient(pool, node) is None
-        pool.rungs[node] = RUNG
+        pool.rungs[node] = FIRST_RUNG
         assert quotient(pool, node) == (1, single)
-        pool.rungs[node] = RUNG + 1
+        pool.rungs[node] = FIRST_RUNG + 1
         assert quotient(pool, node) is None

@@ -73,15 +73,6 @@ def exchanged(run: Experiment) -> tuple[int, int] | None:
     return None if run.test is None else _exchanged(*sent_and_asked(run.test, run.trajectory), run.test)
 
 
-def exchanged_with_state(run: Experiment) -> tuple[str, str] | None:
-    """A state and a command, which is that of the test's controller once their columns are exchanged; None: no two are.
-
-    Args:
-        run: of a test.
-    """
-    return None if run.test is None else _exchanged_with_state(run.test, run.trajectory)
-
-
 def change_that_rights(run: Experiment) -> str:
     """What of a log has to be changed so that its commands are those of the test's controller.
 
@@ -169,16 +160,16 @@ def _exchanged(sent: Floats, asked: Floats, test: Test) -> tuple[int, int] | Non
     return None
 
 
-def _exchanged_with_state(test: Test, run: Trajectory) -> tuple[str, str] | None:
-    signals = test.signals
+def _exchanged_with_state(test: Test, run: Trajectory) -> bool:
+    """Whether a command is that of the test's controller once its column is exchanged with that of a state."""
     before = apart(*sent_and_asked(test, run), test)
-    for j, i in product(np.flatnonzero(before > LITTLE * LITTLE).tolist(), signals.measured):
+    for j, i in product(np.flatnonzero(before > LITTLE * LITTLE).tolist(), test.signals.measured):
         change = with_state(test, run, i, j)
         asked = [given(as_excited(test, how), change.states) for how in hows(test)]
         # Unlike of two commands, there is one column alone to be held against the controller.
         if NEARER * min(apart(change.commands, each, test)[j] for each in asked) <= before[j]:
-            return signals.state_names[i], signals.command_names[j]
-    return None
+            return True
+    return False
 
 
 def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
@@ -196,7 +187,7 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
             found[run.test.number] = _pulses(sent[:, far], asked[:, far], span[far])
         elif (
             _exchanged(sent, asked, run.test) is not None
-            or _exchanged_with_state(run.test, run.trajectory) is not None
+            or _exchanged_with_state(run.test, run.trajectory)
             or nearest(run.test, run.trajectory, _of_states(run.test, run.trajectory))
         ):
             found[run.test.number] = False

@@ -15,7 +15,7 @@ MOST = 20
 """Periods of delay up to which flights are tried; no clock, bus or scheduler is that late."""
 
 
-def periods_borne(models: Sequence[_core.Model], test: Test, limits: Limits, most: int = MOST) -> int:
+def periods_borne(models: Sequence[_core.Model], test: Test, limits: Limits) -> int:
     """With how many more periods of delay a flight neither diverges nor leaves its envelope.
 
     Margins are those of small departures. A flight also meets the bounds of its commands, and all that is not linear.
@@ -25,7 +25,6 @@ def periods_borne(models: Sequence[_core.Model], test: Test, limits: Limits, mos
             counted elsewhere.
         test: what is flown, without noise.
         limits: where a flight counts as diverged.
-        most: periods that are tried.
 
     Returns:
         The largest number up to which every number of periods is borne; 0 if one is not.
@@ -38,7 +37,7 @@ def periods_borne(models: Sequence[_core.Model], test: Test, limits: Limits, mos
 
     twin, *members = models
     flying = [twin, *(member for member in members if borne(member))]
-    for periods in range(1, most + 1):
+    for periods in range(1, MOST + 1):
         if not all(borne(delayed(model, test.signals, periods)) for model in flying):
             return periods - 1
-    return most
+    return MOST

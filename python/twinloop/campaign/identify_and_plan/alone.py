@@ -107,12 +107,8 @@ def share_of(planner: Planner, committee: Committee, test: Test, draws: int) -> 
     """
     if test.excitation is None or not planner.options.alone:
         return 1.0
-    genes, excitation = test.genes[np.newaxis], test.excitation[np.newaxis]
-    members = planner.stable_members(committee.members, genes, excitation)
-    alone = planner.judge(members, genes, committee.sds, draws, measured=True)
-    excited = planner.judge(
-        members, genes, committee.sds, draws, excitation, measured=True, hold_back=test.hold_back
-    )
+    members, excited = planner.as_flown(committee.members, test, committee.sds, draws)
+    alone = planner.judge(members, test.genes[np.newaxis], committee.sds, draws, measured=True)
     without, within = float(alone.mean[0]), float(excited.mean[0])
     usable = math.isfinite(without) and math.isfinite(within) and min(without, within) > 0.0
     return without / within if usable else 1.0

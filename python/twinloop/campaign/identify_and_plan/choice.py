@@ -244,7 +244,7 @@ class Choice:
 
     def _measured_alone(self, flown: Test) -> float | None:
         """Quality that was measured of flown gains, without the effect of their excitation; None of another task."""
-        measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
+        measured = standing.measured_on_task(self.book, flown)
         return (
             None if measured is None else measured * share_of(self.planner, self.committee, flown, self.draws)
         )
@@ -258,7 +258,7 @@ class Choice:
 
     def _flown(self, flown: Test, judged: Judged, recorded: Floats, reason: str) -> Test:
         # A test of another task says nothing of the campaign's own, and is not returned.
-        measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
+        measured = standing.measured_on_task(self.book, flown)
         test = self.book.of_task(flown.genes, flown.number)
         return self._answer(test, measured, judged, recorded, 1, reason)
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.logbook import Logbook
@@ -57,11 +55,5 @@ def _expected(planner: Planner, committee: Committee, flown: Sequence[Test]) -> 
 
 
 def _expected_of(planner: Planner, committee: Committee, test: Test) -> tuple[float, float]:
-    excitation = None if test.excitation is None else test.excitation[np.newaxis]
-    # One that diverges in a flight that went to its end says nothing of how good it was.
-    members = planner.stable_members(committee.members, test.genes[np.newaxis], excitation)
-    judged = planner.judge(
-        members, test.genes[np.newaxis], committee.sds, planner.options.draws, excitation,
-        measured=True, hold_back=test.hold_back,
-    )  # fmt: skip
+    _, judged = planner.as_flown(committee.members, test, committee.sds, planner.options.draws)
     return committee.moved_by_gusts(test).added_to(*expected(judged.qualities[:, :, 0]))

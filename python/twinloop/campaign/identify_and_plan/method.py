@@ -269,9 +269,7 @@ class IdentifyAndPlan:
     def _flown(self, book: Logbook, best: Test | None, tuned: Floats, committee: Committee) -> Flown:
         """What the planner has to know of the flights so far."""
         known = best is not None and standing.flies(book, best.number)
-        good = None
-        if best is not None and known and standing.on_task(book, best):
-            good = standing.measured(book, best.number)
+        good = standing.measured_on_task(book, best) if best is not None and known else None
         # One wrong reading is no place where a flight has been.
         flights = without_wrong_readings(book.experiments, self.setup.signals)
         return Flown(
@@ -384,15 +382,15 @@ class IdentifyAndPlan:
             latest.believed,
             sensors,
             latest.follows,
-            borne,
-            latest.explained,
-            self._gusts(latest, len(book.experiments)),
-            slower(TUNED_WITH) if true else borne,
-            latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
-            self._ending(latest, book),
-            gains_count(self.planner, latest.believed[:1], untunable),
-            lawless,
-            untunable,
+            delayed=borne,
+            explains=latest.explained,
+            gusts=self._gusts(latest, len(book.experiments)),
+            tuned_delayed=slower(TUNED_WITH) if true else borne,
+            foretells=latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
+            ending=self._ending(latest, book),
+            gains_count=gains_count(self.planner, latest.believed[:1], untunable),
+            lawless=lawless,
+            untunable=untunable,
         )
 
     def _ending(self, latest: Learnt, book: Logbook) -> _core.Model | None:

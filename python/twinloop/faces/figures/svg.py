@@ -34,12 +34,11 @@ def panel_svg(panel: Panel) -> str:
     return ET.tostring(_panel(panel), encoding="unicode")
 
 
-def drawing(figure: Figure, style: bool = True) -> str:
+def drawing(figure: Figure) -> str:
     """A whole figure as one drawing, with its style, title and legend in it.
 
     Args:
         figure: to be drawn.
-        style: whether colours are written into it.
 
     Returns:
         An `<svg>` element.
@@ -50,13 +49,8 @@ def drawing(figure: Figure, style: bool = True) -> str:
     rows = -(-len(parts) // columns)
     top = 28.0 + (18.0 if figure.legend else 0.0)
     whole = _root(columns * widths, top + rows * heights, figure.title)
-    if style:
-        ET.SubElement(whole, "style").text = STYLE
-        _add(
-            whole,
-            "rect",
-            {"width": _n(columns * widths), "height": _n(top + rows * heights), "class": "paper"},
-        )
+    ET.SubElement(whole, "style").text = STYLE
+    _add(whole, "rect", {"width": _n(columns * widths), "height": _n(top + rows * heights), "class": "paper"})
     _text(whole, 10.0, 18.0, figure.title, "heading")
     _legend(whole, figure)
     for number, part in enumerate(parts):

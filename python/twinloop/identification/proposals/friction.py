@@ -22,11 +22,11 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
 from twinloop.identification.search.noise import calm, still
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.structure import Sum, priced, prices, weighed
+from twinloop.identification.search.structure import RUNG, Sum, priced, prices, weighed
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
 
-WORTH = 20.0
-"""What friction must gain, in units of χ², beside its price: as much as a rung of the ladder."""
+WORTH = RUNG
+"""What friction must gain, in units of χ², beside its price."""
 ROUNDS = 4
 """Times that each equation may get one more term."""
 FINALISTS = 3

@@ -24,7 +24,7 @@ from twinloop.identification.description import shorter, shortest
 from twinloop.identification.search.coupled import RIDGE, Chosen, CoupledTerms, Equation, MassTerm, thinned
 from twinloop.identification.search.implicit import NOISE_ROUNDS, bounded, driving, whitened
 from twinloop.identification.search.problem import Columns, Problem
-from twinloop.identification.search.structure import Sum, prices, search, total
+from twinloop.identification.search.structure import RUNG, Sum, prices, search, total
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.friction import frictions_in
@@ -48,7 +48,7 @@ SHORTER = 3
 """How many times shorter walks are that try one more term of a joint's own mass: there are many such terms."""
 LEAST = 100
 """Moves of a search among next to no terms."""
-WORTH = 20.0
+WORTH = RUNG
 """What equations must gain together, in units of χ², beside their price: as much as a rung of the ladder."""
 OWN = 3
 """Terms at most that the mass of a joint itself depends on."""

@@ -78,9 +78,7 @@ def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
     return chain.with_noise(sensors, motion)
 
 
-def first_noise(
-    problem: Problem, chains: Sequence[Chain], terms: Sequence[int], gusts: bool = True
-) -> list[Chain]:
+def first_noise(problem: Problem, chains: Sequence[Chain], terms: Sequence[int], gusts: bool) -> list[Chain]:
     """The noise that a fit of all terms leaves, corrected for its degrees of freedom.
 
     Args:

@@ -17,12 +17,12 @@ from twinloop.identification.search.implicit import Quotient, bounded, implicit,
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.saturation import inverses, saturations
-from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.search.structure import RUNG, Sum, search
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.denominators import (
+    FIRST_RUNG,
     HIGHEST,
-    RUNG,
     Denominator,
     above_it,
     denominators,
@@ -41,8 +41,8 @@ ALONE = 5000
 """Number of the first unit of work that looks for states alone below the line."""
 ROUNDS = 2
 """Denominators of one sum at most."""
-WORTH = 20.0
-"""What a new denominator must gain, in units of χ², beside its price: as much as a rung of the ladder."""
+WORTH = RUNG
+"""What a new denominator must gain, in units of χ², beside its price."""
 TURNS = 2
 """How often the terms over a denominator are chosen, and its constants refined behind them."""
 OWN = 10
@@ -207,7 +207,7 @@ class _Finder:
             if parts is not None and parts[1] == own:
                 term = over(self.pool, parts[0], there)
                 lengths[term] = self.pool.length(parts[0]) + CHOICE + share
-                self.pool.rungs.setdefault(term, RUNG)
+                self.pool.rungs.setdefault(term, FIRST_RUNG)
             terms.append(term)
         return self._search(known.chain, terms, None, lengths, self.few)
 
@@ -285,7 +285,7 @@ class _Finder:
         """Terms over a denominator, with their description lengths where that is paid for."""
         ratios = {over(self.pool, term, denominator): self.pool.length(term) + CHOICE for term in terms}
         for node in ratios:
-            self.pool.rungs.setdefault(node, RUNG)
+            self.pool.rungs.setdefault(node, FIRST_RUNG)
         return ratios
 
     def _paid(self, found: Sum, denominator: Denominator) -> Sum:

@@ -21,7 +21,7 @@ from twinloop.signals import Signals, rates
 HIGHEST = 4
 """Power of a state below the line at most: of Hill's law for four places that bind together."""
 
-RUNG = 0
+FIRST_RUNG = 0
 """On which rung of the ladder quotients stand: their denominator is priced, constant by constant."""
 
 
@@ -131,7 +131,7 @@ def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
     if _is_alone(pool, operands[1]):
         # The ladder divides by states as well, and prices what it divides.
         below_it = Denominator(((operands[1], 1.0),), 0.0)
-        return (operands[0], below_it) if pool.rungs.get(number) == RUNG else None
+        return (operands[0], below_it) if pool.rungs.get(number) == FIRST_RUNG else None
     if lower.operation != "-" or lower.operands[0] != pool.one:
         return None
     parts, waiting = [], [lower.operands[1]]

@@ -119,16 +119,17 @@ WIDE = 64
 """Characters, as a reader sees them, that the right side of an equation may be long on one line of a page."""
 ON_ANOTHER_LINE = " \\\\\n  &\\quad "
 
+DIGITS = 6
+"""Significant digits of constants in LaTeX."""
 IN_FULL = replace(LATEX, longest=sys.maxsize, worth=sys.maxsize)
 """No part of an equation has a name."""
 
 
-def latex_source(law: Law, digits: int = 6) -> str:
+def latex_source(law: Law) -> str:
     """A law as LaTeX, multiplied out.
 
     Args:
         law: of a twin.
-        digits: significant digits of constants.
 
     Returns:
         An `align*` environment of amsmath with an equation a state, and one for each that is read late or early.
@@ -138,7 +139,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
         target.input(place)
     expansion = Expansion(law.expressions, target)
     roots = [written(target, expansion[root]) for root in law.outputs]
-    writer = Writer(target, roots, [latex_name(symbol) for symbol in law.symbols], digits, "t_", False, LATEX)
+    writer = Writer(target, roots, [latex_name(symbol) for symbol in law.symbols], DIGITS, "t_", False, LATEX)
     lines = [
         rf"  {name} &= {_in_lines(writer.terms(number, define=True))}"
         for number, name in writer.names.items()
@@ -151,7 +152,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
             terms = writer.terms(outputs[root])
         else:
             terms = Writer(
-                law.expressions, every, _given_symbols(law, place), digits, "t_", False, IN_FULL
+                law.expressions, every, _given_symbols(law, place), DIGITS, "t_", False, IN_FULL
             ).terms(root)
         right = _in_lines(terms)
         if law.form == "acceleration":
@@ -165,15 +166,15 @@ def latex_source(law: Law, digits: int = 6) -> str:
                 left_bracket, right_bracket = (
                     (r"\Bigl(", r"\Bigr)") if ON_ANOTHER_LINE in right else (r"\left(", r"\right)")
                 )
-                step = _latex_number(law.signals.dt, digits)
+                step = _latex_number(law.signals.dt, DIGITS)
                 right = f"{symbol} + {step} {left_bracket}{right}{right_bracket}"
         lines.append(rf"  {left} &= {right}")
     lines = [re.sub(r"\bt_([0-9]+)", r"t_{\1}", line) for line in lines]
     for place, offset in _late(law):
-        symbol, shift = latex_name(law.signals.state_names[place]), _latex_number(abs(offset), digits)
+        symbol, shift = latex_name(law.signals.state_names[place]), _latex_number(abs(offset), DIGITS)
         sign = "-" if offset > 0.0 else "+"
         lines.append(rf"  {symbol}_{{\mathrm{{read}}}}(t) &= {symbol}(t {sign} {shift}\,\mathrm{{s}})")
-    notes = "".join(f"% {note}\n" for note in _notes(law, digits))
+    notes = "".join(f"% {note}\n" for note in _notes(law, DIGITS))
     return notes + "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}\n"
 
 
