@@ -14,6 +14,9 @@ from twinloop.store import StoredAs
 
 name_option = click.option("--name", help="Name of the campaign, if the store holds several.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+threads_option = click.option(
+    "--threads", type=int, help="Number of threads; all by default. Results do not depend on it."
+)
 
 
 def answer(facts: Mapping[str, object], sentence: str, as_json: bool, err: bool = False) -> None:

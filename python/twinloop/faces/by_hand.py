@@ -15,7 +15,7 @@ from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.persistence import stored_as
 from twinloop.errors import InvalidInput, NotAvailable
-from twinloop.faces.answering import answer, json_option, name_option, next_command
+from twinloop.faces.answering import answer, json_option, name_option, next_command, threads_option
 from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.files import check_writable
@@ -66,8 +66,8 @@ def new(file: Path, as_json: bool) -> None:
     "--batch", type=int, metavar="N", help="Plan N alternative tests, the best first; fly them in any order."
 )
 @name_option
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@threads_option
+@json_option
 def ask(
     store: str,
     last: bool,

@@ -19,6 +19,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file
 from twinloop.campaign.presets import PRESETS, options_of, parsed
 from twinloop.errors import InvalidInput, NotAvailable, NotTrusted, TwinloopError, unknown
+from twinloop.faces.answering import threads_option
 from twinloop.faces.by_hand import abandon, ask, attach, new, tell
 from twinloop.faces.certifying import certify
 from twinloop.faces.console import Watch
@@ -31,24 +32,22 @@ from twinloop.faces.settings import settings
 from twinloop.faces.stored import learn, resume, show
 from twinloop.faces.terminal import prepared
 from twinloop.faces.withdrawing import withdraw
-from twinloop.faces.working import answers, check_answer, patient, work
+from twinloop.faces.working import Answers, answering, check_experiments, patient, work
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.systems import BUILT_IN, Quadrotor
 
 SAID_BY_A_FILE = (
-    *(
-        "seed",
-        "preset",
-        "goal",
-        "quality",
-        "weights",
-        "generations",
-        "test_generations",
-        "noise",
-        "gyroscopic",
-        "harsh",
-    ),
+    "seed",
+    "preset",
+    "goal",
+    "quality",
+    "weights",
+    "generations",
+    "test_generations",
+    "noise",
+    "gyroscopic",
+    "harsh",
     "changes",
 )
 """Options of `run` that a campaign file has."""
@@ -112,7 +111,7 @@ def main(context: click.Context) -> None:
 @main.command()
 @click.argument("system")
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@threads_option
 @click.option("--preset", default="default", show_default=True, help=f"Set of options: {', '.join(PRESETS)}.")
 @click.option(
     "--experiments",
@@ -156,7 +155,7 @@ def main(context: click.Context) -> None:
     "--max-risk", type=float, help="Highest probability of leaving the envelope that a test may have."
 )
 @patient
-@answers
+@answering
 @click.pass_context
 def run(
     context: click.Context,
@@ -178,9 +177,7 @@ def run(
     name: str,
     max_risk: float | None,
     timeout: float | None,
-    output: Path | None,
-    plot: Path | None,
-    as_json: bool,
+    answers: Answers,
 ) -> None:
     """Experiment on a SYSTEM: learn its twin, tune its controller.
 
@@ -193,20 +190,15 @@ def run(
         _refuse_beside_a_file(context)
         kept_in = Path(system).with_suffix(".db") if store is None else store
         file = read_file(system)
-        context.exit(
-            run_file(file, kept_in, name, experiments, threads, output, plot, as_json, timeout, max_risk)
-        )
+        context.exit(run_file(file, kept_in, name, experiments, threads, answers, timeout, max_risk))
     if system not in BUILT_IN:
         raise unknown("system", system, BUILT_IN)
-    if experiments < 1:
-        raise InvalidInput(
-            f"--experiments: expected at least 1, found {experiments}; the first flight counts."
-        )
+    check_experiments(experiments)
     options = dict(_change(preset, change) for change in changes)
     options |= _generations(preset, generations, test_generations)
     rig = _vehicle(system, noise, seed, gyroscopic, harsh)
     watch = Watch(options_of(preset, options), experiments, system)
-    check_answer(output, plot)
+    answers.check()
     campaign = Campaign(
         rig.signals,
         controller=rig.controller,
@@ -224,9 +216,7 @@ def run(
         store=store,
         name=name,
     )
-    context.exit(
-        work(campaign, rig, watch, experiments, output, plot, as_json, timeout=timeout, max_risk=max_risk)
-    )
+    context.exit(work(campaign, rig, watch, experiments, answers, system, timeout, max_risk))
 
 
 for command in (new, ask, tell, attach, abandon, withdraw):
@@ -290,13 +280,14 @@ def _generations(preset: str, models: int | None, tests: int | None) -> dict[str
 
 
 def _vehicle(system: str, noise: float | None, seed: int, gyroscopic: str, harsh: bool) -> Quadrotor:
+    given: dict[str, Any] = {} if noise is None else {"noise": noise}
     if not harsh:
-        return BUILT_IN[system](noise=0.0 if noise is None else noise, seed=seed, gyroscopic=gyroscopic)
+        return BUILT_IN[system](**given, seed=seed, gyroscopic=gyroscopic)
     if gyroscopic != "physical":
         raise InvalidInput(
             f"--harsh: expected --gyroscopic physical, found {gyroscopic!r}; leave one of the two out."
         )
-    return BUILT_IN[system].harsh(noise=1e-3 if noise is None else noise, seed=seed)
+    return BUILT_IN[system].harsh(**given, seed=seed)
 
 
 def _is_here(name: str) -> bool:

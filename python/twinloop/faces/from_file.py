@@ -9,7 +9,7 @@ from twinloop.campaign.campaign_file import CampaignFile, read_file
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import Watch
 from twinloop.faces.first_test import first_test
-from twinloop.faces.working import check_answer, work
+from twinloop.faces.working import Answers, check_experiments, work
 from twinloop.store import is_address
 
 
@@ -19,9 +19,7 @@ def run_file(
     name: str,
     experiments: int,
     threads: int | None,
-    output: Path | None,
-    plot: Path | None,
-    as_json: bool,
+    answers: Answers,
     timeout: float | None = None,
     max_risk: float | None = None,
 ) -> int:
@@ -33,9 +31,7 @@ def run_file(
         name: of the campaign in its store.
         experiments: runs in all.
         threads: of the engine; None: all.
-        output: for the result; None: none.
-        plot: for the picture; None: none.
-        as_json: whether the result is printed as JSON.
+        answers: where the result goes.
         timeout: seconds that a run may take; None: what the file says.
         max_risk: probability of leaving the envelope above which a test is not flown; None: any.
 
@@ -46,11 +42,8 @@ def run_file(
         InvalidInput: a file, a system or a number that cannot be used.
         NotAvailable: the file names no system, or a package is missing.
     """
-    if experiments < 1:
-        raise InvalidInput(
-            f"--experiments: expected at least 1, found {experiments}; the first flight counts."
-        )
-    check_answer(output, plot)
+    check_experiments(experiments)
+    answers.check()
     rig = file.system()
     assert file.flies is not None  # there would be no system
     campaign = file.campaign(store=store, name=name, threads=threads)
@@ -62,7 +55,7 @@ def run_file(
         campaign.close()
         raise
     seconds = file.flies.timeout if timeout is None else timeout
-    return work(campaign, rig, watch, experiments, output, plot, as_json, file.flies.use, seconds, max_risk)
+    return work(campaign, rig, watch, experiments, answers, file.flies.use, seconds, max_risk)
 
 
 def _first(campaign: Campaign, file: CampaignFile) -> None:

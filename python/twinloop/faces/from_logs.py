@@ -15,6 +15,7 @@ from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.campaign.presets import options_of
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import json_option, threads_option
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_writable
 from twinloop.faces.report.page import report_page, templates
@@ -43,8 +44,8 @@ from twinloop.trajectory import Trajectory, check_recorded, completed
 @click.option("-o", "--output", type=Path, metavar="FILE.json", help="Write the twin to this file.")
 @click.option("--report", type=Path, metavar="FILE.html", help="Write an HTML report with all checks.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@threads_option
+@json_option
 @click.option("--force", is_flag=True, help="Write the twin even if it does not follow its own logs.")
 def identify(
     logs: tuple[Path, ...],

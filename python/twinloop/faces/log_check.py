@@ -13,6 +13,7 @@ from twinloop._ground.times import shown_time
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.examination.log_check import LogCheck, check_log
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import json_option
 from twinloop.faces.files import check_writable
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.text import table
@@ -28,7 +29,7 @@ from twinloop.unmeasured import columns_of, names_of
 )
 @click.option("--to", "stop", type=float, metavar="S", help="For a .ulg: last time, s after its beginning.")
 @click.option("-o", "--output", type=Path, metavar="FILE.csv", help="Also write the log as CSV, for tell.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 def check(
     log: Path, config: Path, start: float | None, stop: float | None, output: Path | None, as_json: bool
 ) -> int:

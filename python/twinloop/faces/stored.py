@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import closing, suppress
-from pathlib import Path
 from typing import Any
 
 import click
@@ -13,7 +12,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import behind
 from twinloop.campaign.keeping import heading, look
 from twinloop.errors import InvalidInput, NotAvailable
-from twinloop.faces.answering import name_option, next_command
+from twinloop.faces.answering import json_option, name_option, next_command, threads_option
 from twinloop.faces.answers import DO_NOT_FLY
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
@@ -24,7 +23,7 @@ from twinloop.faces.telling import awaited, counted
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.withdrawing import named
-from twinloop.faces.working import answers, check_answer, described, knows_nothing, patient, work
+from twinloop.faces.working import Answers, answering, described, knows_nothing, patient, work
 from twinloop.store import Stored, StoredAs, listed, opened
 from twinloop.systems import BUILT_IN, Quadrotor
 
@@ -33,9 +32,9 @@ from twinloop.systems import BUILT_IN, Quadrotor
 @click.argument("store")
 @name_option
 @click.option("--experiments", type=int, help="Total number of runs; by default as first requested.")
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@threads_option
 @patient
-@answers
+@answering
 @click.pass_context
 def resume(
     context: click.Context,
@@ -44,15 +43,13 @@ def resume(
     experiments: int | None,
     threads: int | None,
     timeout: float | None,
-    output: Path | None,
-    plot: Path | None,
-    as_json: bool,
+    answers: Answers,
 ) -> None:
     """Continue a campaign of STORE on its system, with the same bits.
 
     The system is a built-in one, or the one that the campaign file beside the store names.
     """
-    check_answer(output, plot)
+    answers.check()
     held = look(store, name, read_only=False)
     file = beside(store)
     if file is not None:
@@ -62,21 +59,21 @@ def resume(
                 "resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
                 " state the total number of runs."
             )
-        context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json, timeout))
-    rig = _system(held)
+        context.exit(run_file(file, store, held.name, wanted, threads, answers, timeout))
+    kind, rig = _system(held)
     budget = held.experiments if experiments is None else experiments
     assert budget is not None  # it stands beside the system
     campaign = Campaign.load(store, held.name, threads=threads)
-    watch = Watch(campaign.options, budget, "quadrotor")
+    watch = Watch(campaign.options, budget, kind)
     campaign.progress = watch
-    context.exit(work(campaign, rig, watch, budget, output, plot, as_json, timeout=timeout))
+    context.exit(work(campaign, rig, watch, budget, answers, kind, timeout))
 
 
 @click.command()
 @click.argument("store")
 @name_option
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@threads_option
+@json_option
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
     """Learn from all recorded flights of a campaign of STORE, as the next ask would, without planning a test."""
     known, _ = heading(store, name)
@@ -92,7 +89,7 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
 @click.command()
 @click.argument("store")
 @name_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 def show(store: str, name: str | None, as_json: bool) -> None:
     """Show the contents of STORE; nothing is learnt or changed, and a writer is not delayed."""
     campaigns = _campaigns(store)
@@ -143,8 +140,8 @@ def _campaigns(store: str) -> list[dict[str, Any]]:
         source.close()
 
 
-def _system(held: Stored) -> Quadrotor:
-    """The system that a campaign flies, if it is a built-in one."""
+def _system(held: Stored) -> tuple[str, Quadrotor]:
+    """The system that a campaign flies, and its name, if it is a built-in one."""
     kind = None if held.system is None else held.system["kind"]
     if kind not in BUILT_IN:
         raise NotAvailable(
@@ -152,15 +149,15 @@ def _system(held: Stored) -> Quadrotor:
             " file beside the store that names one, found neither; write [system] into that file, fly"
             " yourself with twinloop ask, or continue from Python with the same arguments and store=."
         )
-    return BUILT_IN[kind].from_record(held.system)
+    return kind, BUILT_IN[kind].from_record(held.system)
 
 
 def _named(held: Stored) -> dict[str, object]:
     try:
-        system = _system(held)
+        kind, system = _system(held)
     except (NotAvailable, InvalidInput):
         return {"name": "a system of your own"}
-    return described("quadrotor", system)
+    return described(kind, system)
 
 
 def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:

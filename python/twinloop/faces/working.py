@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +16,7 @@ from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign, controller_to_fly, refused_an_answer
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky, TwinloopError
-from twinloop.faces.answering import next_command
+from twinloop.faces.answering import json_option, next_command
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable
 from twinloop.faces.result import Result, summary, to_json
@@ -33,21 +35,57 @@ KEPT_NOWHERE = "run it with --store FILE.db, then twinloop report FILE.db"
 """What shows the checks of a campaign that no store keeps."""
 
 
-def answers(command: Command) -> Command:
-    """Options of a command that answers with the result of a campaign: `output`, `plot` and `as_json`.
+@dataclass(frozen=True)
+class Answers:
+    """Where the result of a campaign goes.
+
+    Args:
+        output: a file for it, as JSON; None: none.
+        plot: a file for its picture; None: none.
+        as_json: whether it is printed as JSON.
+    """
+
+    output: Path | None
+    plot: Path | None
+    as_json: bool
+
+    def check(self) -> None:
+        """Refuses files that cannot be written, before any work is done.
+
+        Raises:
+            InvalidInput: a file cannot be written, or there is nowhere to print to.
+            NotAvailable: matplotlib is missing.
+        """
+        if self.output is not None:
+            check_writable(self.output, [".json"])
+        elif is_closed():
+            raise InvalidInput(
+                "Standard output: expected somewhere to print the result, found it closed; open it, or pass --output."
+            )
+        if self.plot is not None:
+            check_picture(self.plot)
+
+
+def answering(command: Callable[..., None]) -> Callable[..., None]:
+    """The options of a command that answers with the result of a campaign, which it gets as its `answers`.
 
     Args:
         command: of click.
     """
+
+    @wraps(command)
+    def asked(*given: Any, output: Path | None, plot: Path | None, as_json: bool, **options: Any) -> None:
+        command(*given, answers=Answers(output, plot, as_json), **options)
+
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
+        json_option,
         click.option("--plot", type=Path, metavar="FILE.svg|png", help="Also draw the runs and the errors."),
         click.option(
             "--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON."
         ),
     ):
-        command = option(command)
-    return command
+        asked = option(asked)
+    return asked
 
 
 def patient(command: Command) -> Command:
@@ -66,25 +104,19 @@ def patient(command: Command) -> Command:
     )(command)
 
 
-def check_answer(output: Path | None, plot: Path | None) -> None:
-    """Refuses files that cannot be written, before any work is done.
+def check_experiments(experiments: int) -> None:
+    """Refuses a number of runs that is none.
 
     Args:
-        output: for the result; None: none.
-        plot: for the picture; None: none.
+        experiments: runs in all.
 
     Raises:
-        InvalidInput: a file cannot be written, or there is nowhere to print to.
-        NotAvailable: matplotlib is missing.
+        InvalidInput: fewer than one.
     """
-    if output is not None:
-        check_writable(output, [".json"])
-    elif is_closed():
+    if experiments < 1:
         raise InvalidInput(
-            "Standard output: expected somewhere to print the result, found it closed; open it, or pass --output."
+            f"--experiments: expected at least 1, found {experiments}; the first flight counts."
         )
-    if plot is not None:
-        check_picture(plot)
 
 
 def work(
@@ -92,10 +124,8 @@ def work(
     rig: System,
     watch: Watch,
     experiments: int,
-    output: Path | None,
-    plot: Path | None,
-    as_json: bool,
-    name: str = "quadrotor",
+    answers: Answers,
+    name: str,
     timeout: float | None = None,
     max_risk: float | None = None,
 ) -> int:
@@ -106,9 +136,7 @@ def work(
         rig: that it flies.
         watch: that shows its progress.
         experiments: runs in all.
-        output: for the result; None: none.
-        plot: for the picture; None: none.
-        as_json: whether the result is printed as JSON.
+        answers: where the result goes.
         name: of the system.
         timeout: seconds that a run may take; None: as long as it wants.
         max_risk: probability of leaving the envelope above which a test is not flown; None: any.
@@ -152,11 +180,12 @@ def work(
     finally:
         campaign.close()
     try:
-        if output is not None:
-            write_whole(output, to_json(result))
-            click.echo(f"Result: {output}", err=True)
+        if answers.output is not None:
+            write_whole(answers.output, to_json(result))
+            click.echo(f"Result: {answers.output}", err=True)
     finally:  # a full disk must not take the result with it
-        show_result(result, as_json, evidence)
+        show_result(result, answers.as_json, evidence)
+    plot = answers.plot
     if plot is not None:
         _uninterrupted(lambda: campaign.plot(plot))
         click.echo(f"Picture: {plot}", err=True)

@@ -10,6 +10,7 @@ from twinloop._ground.arrays import whole
 from twinloop._ground.writing import write_whole
 from twinloop.campaign import available_threads
 from twinloop.errors import InvalidInput, unknown
+from twinloop.faces.answering import json_option, threads_option
 from twinloop.faces.files import check_picture, check_writable
 from twinloop.faces.result import to_json
 from twinloop.faces.run_info import Stopwatch
@@ -29,13 +30,13 @@ SMOKE_RUNS, SMOKE_GENERATIONS = 2, 20
     "--generations", type=int, help="Of the model loop; 15000 by default, the test loop keeps its ratio."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@threads_option
 @click.option("--smoke", is_flag=True, help="A few seconds: does it run? The numbers mean nothing.")
 @click.option("--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON.")
 @click.option(
     "--plot", type=Path, metavar="FILE.svg|png", help="Where to draw figure6; figure6.svg by default."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 @click.pass_context
 def reproduce(
     context: click.Context,

@@ -9,6 +9,7 @@ import click
 
 from twinloop.campaign.presets import PRESETS
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import json_option
 from twinloop.store import is_address, shown_name
 from twinloop.sweep.campaigns import Outcome
 from twinloop.sweep.campaigns import sweep as fly_all
@@ -39,7 +40,7 @@ from twinloop.sweep.workers import HERE
     metavar="FILE.db|URL",
     help="Where the campaigns are stored.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 @click.pass_context
 def sweep(
     context: click.Context,

@@ -161,5 +161,5 @@ def _built_in(name: str, rest: str, seed: int) -> Any:
         except ValueError:
             raise InvalidInput(f"System {name}:{rest}: expected a number, found {value!r}.") from None
     if harsh:
-        return BUILT_IN[name].harsh(**{"noise": 1e-3, **settings})
+        return BUILT_IN[name].harsh(**settings)
     return BUILT_IN[name](**settings)

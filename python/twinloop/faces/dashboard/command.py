@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from twinloop.errors import InvalidInput, NotAvailable
-from twinloop.faces.answering import answer, json_option
+from twinloop.faces.answering import answer, json_option, threads_option
 from twinloop.faces.dashboard.fence import LOOPBACK
 
 PORT = 8731
@@ -30,7 +30,7 @@ SHORTEST = 16
     help="Address to listen on; others than loopback require a token.",
 )
 @click.option("--token", help=f"Of at least {SHORTEST} characters; by default one is made and printed.")
-@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@threads_option
 @json_option
 def dashboard(
     store: str, port: int, host: str, token: str | None, threads: int | None, as_json: bool
