@@ -32,7 +32,7 @@ FRONTS = {
     ),
     "campaign/identify_and_plan": "method",
     "controllers": "custom family gains riccati state_feedback",
-    "faces": "cli console files notebook plots result run_info terminal",
+    "faces": "answering cli console files notebook plots result run_info terminal",
     "faces/dashboard": "command",
     "faces/figures": "catalogue figure plots saving style svg units",
     "faces/report": "command page source",

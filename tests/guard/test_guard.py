@@ -193,7 +193,7 @@ def test_a_flight_that_would_leave_is_ended_before_it_does_and_the_fallback_keep
 def test_a_horizon_is_rounded_up_and_only_none_at_all_looks_at_nothing(campaign, seconds, periods):
     test = campaign.test(WILD, excitation=None)
     guard = campaign.guard(test, horizon=seconds, clock=None)
-    assert guard.horizon == periods and bool(guard._aheads) == (periods > 0)
+    assert guard.horizon == periods and (guard._ahead.committee is not None) == (periods > 0)
     guard.command([1.25, 3.0], test.target(0))
     assert ("angle would leave its envelope in 0.05 s" in guard.reason) == (periods > 0)
 
@@ -223,8 +223,9 @@ def watched_ahead():
             guard.command(reading, test.target(0))
         return guard.tripped_at
 
-    assert guard._aheads[0].leaving(CALM, 6) is None and guard._aheads[0].leaving(AT_THE_EDGE, 6)[0] == 1
-    assert guard._aheads[0].leaving(FAST, 6)[0] > 1
+    calm, fast, at_the_edge = map(np.array, (CALM, FAST, AT_THE_EDGE))
+    assert guard._ahead.leaves(calm, 6) is None and guard._ahead.leaves(at_the_edge, 6)[0] == 1
+    assert guard._ahead.leaves(fast, 6)[0] > 1
     return guard, tripped_at
 
 
@@ -684,10 +685,10 @@ def test_a_twin_that_does_not_follow_the_flights_watches_nothing(campaign, monke
     test = campaign.test(WILD, excitation=None)
     assert campaign.twin.follows
     guard = campaign.guard(test, clock=None)
-    assert guard._aheads and guard._band is not None
+    assert guard._ahead.committee is not None and guard._band is not None
     monkeypatch.setattr(campaign.twin, "follows", False)
     guard = campaign.guard(test, clock=None)
-    assert not guard._aheads and guard._band is None
+    assert guard._ahead.committee is None and guard._band is None
     guard.command(AT_THE_EDGE, test.target(0))
     assert not guard.tripped
     fly(guard, test)

@@ -11,20 +11,18 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twinloop import _core
 from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop._ground.texts import in_unit
 from twinloop.controllers import Controller
-from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.errors import InvalidInput
+from twinloop.guard.ahead import Ahead
 from twinloop.guard.band import BandWatch
 from twinloop.guard.rounded import RoundedWatch
 from twinloop.guard.sensors import SensorWatch
-from twinloop.guard.standby import Standby
-from twinloop.law.reports import sensed
+from twinloop.guard.standby import Standby, safe
 from twinloop.law.twin import Twin
-from twinloop.signals import Bounds, Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 from twinloop.unmeasured import Differences, completed_state, or_measured, sources
@@ -100,9 +98,7 @@ class Guard:
         # A periodic state turns up at any number of turns; those around the middle are those that the bounds mean.
         self._middle = np.array([0.0 if np.isinf(low) else 0.5 * (low + high) for low, high in bounds])
         self._half = np.array([0.5 * (high - low) for low, high in bounds])
-        self._aheads = [] if twin is None or not self.horizon else _look_aheads(test, twin, bounds)
-        self._expecting = self._aheads[-1:] if twin is None or self._aheads else _blind(test, twin, bounds)
-        self._predicting = [*self._aheads[:-1], *self._expecting]
+        self._ahead = Ahead.of(test, twin, bounds, leaving=self.horizon > 0)
         drawn = twin is not None and twin.members and twin.noise is not None
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
         limits = Limits(self.signals) if limits is None else limits
@@ -126,7 +122,7 @@ class Guard:
 
     @fallback.setter
     def fallback(self, fallback: Controller | ArrayLike) -> None:
-        self._fallback = found = _safe(fallback, self.signals)
+        self._fallback = found = safe(fallback, self.signals)
         self._standby = Standby(found, self.test) if isinstance(found, Controller) else None
 
     def reset(self) -> None:
@@ -145,8 +141,7 @@ class Guard:
         self._sensors.reset()
         if self._standby is not None:
             self._standby.reset()
-        for ahead in self._predicting:
-            ahead.reset()
+        self._ahead.reset()
         if self._band is not None:
             self._band.reset()
 
@@ -200,13 +195,14 @@ class Guard:
             command = self._standby.command(reading, goal, self._broken)
         else:
             command = np.array(self.fallback, dtype=np.float64)
-        self._estimate = reading
-        for expecting in self._expecting:
-            next_one = expecting.following(reading, command)
-            # Flown blind for long a twin may diverge: then the last reading that was believed is the better guess.
-            self._estimate = np.where(np.abs(next_one) <= self._sensors.farthest, next_one, reading)
-        for ahead in self._predicting:
-            ahead.sent(reading, goal, command)
+        next_one = self._ahead.following(reading, command)
+        # Flown blind for long a twin may diverge: then the last reading that was believed is the better guess.
+        self._estimate = (
+            reading
+            if next_one is None
+            else np.where(np.abs(next_one) <= self._sensors.farthest, next_one, reading)
+        )
+        self._ahead.sent(reading, goal, command)
         self.period += 1
         return command
 
@@ -314,9 +310,9 @@ class Guard:
                 return self._trip(
                     f"the reading of {name} has not changed for too long, though by the twin it should have moved"
                 )
-        if self._aheads and self.period < self.test.steps:
+        if self.horizon and self.period < self.test.steps:
             near = self.signals.continued(reading[np.newaxis], self._middle)[0]
-            found = self._aheads[0].leaving(near, self.horizon)
+            found = self._ahead.leaves(near, self.horizon)
             self._leaving = 0 if found is None else self._leaving + 1
             if found is not None and (self._leaving >= CERTAIN or found[0] < CERTAIN):
                 seconds = found[0] * self.signals.dt
@@ -375,78 +371,3 @@ def _periods(seconds: float, dt: float) -> int:
     # 0.3 s are six periods of 0.05 s, whatever rounding adds to them.
     whole = round(periods)
     return whole if math.isclose(periods, whole, rel_tol=1e-9) else math.ceil(periods)
-
-
-def _safe(fallback: Controller | ArrayLike, signals: Signals) -> Controller | Floats:
-    """A fallback that sends nothing beyond the bounds of the commands."""
-    if isinstance(fallback, Controller):
-        own = fallback.family.signals
-        for what, expected, found in (
-            ("states", signals.state_names, own.state_names),
-            ("periodic states", signals.periods, own.periods),
-            ("commands", _sendable(signals), _sendable(own)),
-            ("period", signals.dt, own.dt),
-        ):
-            if expected != found:
-                raise InvalidInput(
-                    f"Guard, fallback: expected a controller with the {what} {expected} of the test, found {found};"
-                    " bind its family to the signals of the test."
-                )
-        return fallback
-    held = floats("Guard, fallback (a command)", fallback, (signals.n_u,))
-    for command, value in zip(signals.commands, held.tolist(), strict=True):
-        low, high = command.bounds
-        if not low <= value <= high:
-            raise InvalidInput(
-                f"Guard, fallback: expected {command.name} within its bounds,"
-                f" {in_unit(f'{low:g} to {high:g}', command.unit)}, found {value:g}; hold a command that may be sent."
-            )
-    return held
-
-
-def _sendable(signals: Signals) -> list[tuple[str, Bounds]]:
-    """Names and bounds of the commands."""
-    return [(command.name, command.bounds) for command in signals.commands]
-
-
-def _look_aheads(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> list[_core.LookAhead]:
-    """What says whether a flight is about to leave, and what says, last, what is read next where a reading is missing.
-
-    They are one, unless rates are computed of readings. Flown blind a guard goes on from what it expected, in which a
-    rate must not be half a period old.
-    """
-    members = list(twin.members or (twin.model,))
-    blind = sensed(members[0])
-    several = [members] if blind is members[0] else [members, [blind]]
-    return [_look_ahead(test, twin, each, bounds) for each in several]
-
-
-def _blind(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> list[_core.LookAhead]:
-    """What says what is read next, where nothing looks further ahead; none for a law in Python."""
-    try:
-        return [_look_ahead(test, twin, [sensed((twin.members or (twin.model,))[0])], bounds)]
-    except NotAvailable:
-        return []
-
-
-def _look_ahead(
-    test: Test, twin: Twin, members: Sequence[_core.Model], bounds: list[tuple[float, float]]
-) -> _core.LookAhead:
-    try:
-        return _core.LookAhead(
-            members,
-            twin.limits.setting(test.family.engine),
-            test.genes,
-            test.target_state,
-            test.steps,
-            np.array(bounds),
-            excitation=test.excitation,
-            hold_back=None if test.hold_back is None else test.hold_back.engine,
-        )
-    except ValueError as reason:
-        if "expected a law of the engine" not in str(reason):
-            raise InvalidInput(str(reason)) from reason
-        raise NotAvailable(
-            "Guard: expected a law of the engine, found one in Python, in whose memory nobody can look ahead; pass"
-            " horizon=0, and readings, band and clock are watched."
-        ) from reason

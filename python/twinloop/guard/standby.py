@@ -1,15 +1,18 @@
-"""A fallback that runs along before it is needed, so that its integrals know the load when it takes over."""
+"""A fallback: one that is safe to send, and runs along before it is needed, so that its integrals know the load."""
 
 from __future__ import annotations
 
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, floats
+from twinloop._ground.texts import in_unit
 from twinloop.controllers.family import Controller
+from twinloop.errors import InvalidInput
 from twinloop.guard.integrals import Integrals
+from twinloop.signals import Bounds, Signals
 from twinloop.test import Test
 
 WAITING = 100
@@ -85,3 +88,43 @@ class Standby:
             self.controller.command(reading, self._integrals.target(reading, target, frozen))
         except Exception:
             self._cold = True
+
+
+def safe(fallback: Controller | ArrayLike, signals: Signals) -> Controller | Floats:
+    """A fallback that sends nothing beyond the bounds of the commands.
+
+    Args:
+        fallback: a controller; or a command to hold (n_u,).
+        signals: of the test.
+
+    Raises:
+        InvalidInput: a controller for other signals, or a command beyond its bounds.
+    """
+    if isinstance(fallback, Controller):
+        own = fallback.family.signals
+        for what, expected, found in (
+            ("states", signals.state_names, own.state_names),
+            ("periodic states", signals.periods, own.periods),
+            ("commands", _sendable(signals), _sendable(own)),
+            ("period", signals.dt, own.dt),
+        ):
+            if expected != found:
+                raise InvalidInput(
+                    f"Guard, fallback: expected a controller with the {what} {expected} of the test, found {found};"
+                    " bind its family to the signals of the test."
+                )
+        return fallback
+    held = floats("Guard, fallback (a command)", fallback, (signals.n_u,))
+    for command, value in zip(signals.commands, held.tolist(), strict=True):
+        low, high = command.bounds
+        if not low <= value <= high:
+            raise InvalidInput(
+                f"Guard, fallback: expected {command.name} within its bounds,"
+                f" {in_unit(f'{low:g} to {high:g}', command.unit)}, found {value:g}; hold a command that may be sent."
+            )
+    return held
+
+
+def _sendable(signals: Signals) -> list[tuple[str, Bounds]]:
+    """Names and bounds of the commands."""
+    return [(command.name, command.bounds) for command in signals.commands]
