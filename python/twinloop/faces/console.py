@@ -28,9 +28,12 @@ class Watch:
         experiments: that each will make.
         name: what is being run.
         campaigns: how many there will be, one after the other.
+        after: seconds before the first plain line: for work that is often done at once.
     """
 
-    def __init__(self, options: AnyOptions, experiments: int, name: str, campaigns: int = 1) -> None:
+    def __init__(
+        self, options: AnyOptions, experiments: int, name: str, campaigns: int = 1, after: float = 0.0
+    ) -> None:
         self.experiments = experiments
         self.label = name
         self._name, self._campaigns = name, campaigns
@@ -43,7 +46,7 @@ class Watch:
         self._live = self._table_on_terminal() if sys.stderr.isatty() else None
         self._phase: tuple[str, int] | None = None
         self._phase_start = (0.0, 0)
-        self._last_line = -LINE_SECONDS
+        self._last_line = self._started + after - LINE_SECONDS
 
     def _table_on_terminal(self) -> Live:
         # What a system prints meanwhile goes above the table, but not to where nobody sent it.

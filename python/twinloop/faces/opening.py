@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from twinloop.campaign.agreement import check_agreement
 from twinloop.campaign.campaign_file import read_fields, read_file
 from twinloop.campaign.keeping import gone_on_with, look
 from twinloop.errors import InvalidInput
+from twinloop.faces.console import LINE_SECONDS, Watch
 from twinloop.faces.from_file import file_beside
 from twinloop.store import shown_name
 
@@ -42,10 +44,10 @@ def opened_by_hand(store: str, name: str | None = None, threads: int | None = No
                 f"Store {store}: expected {begun}, which has the campaign of {file}, found another name; for another"
                 " campaign, copy the file."
             )
-        known = gone_on_with(store, name) if Path(store).exists() else None
-        return read_file(file).campaign(store=store, name=known or name or BEGUN, threads=threads)
+        known = (gone_on_with(store, name) if Path(store).exists() else None) or name or BEGUN
+        return in_lines(read_file(file).campaign(store=store, name=known, threads=threads), known)
     if file is None or Path(store).exists():
-        return Campaign.load(store, name, threads=threads)
+        return in_lines(Campaign.load(store, name, threads=threads), name or BEGUN)
     raise InvalidInput(
         f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
         f" {to_type('new', file)}."
@@ -79,7 +81,39 @@ def opened_to_look(store: str, name: str | None) -> tuple[Campaign, str]:
     known = look(store, name, read_only=True).name
     campaign = Campaign.load(store, known, read_only=True)
     check_beside(store, campaign, known)
-    return campaign, known
+    say_if_unlearnt(store, campaign, known)
+    return in_lines(campaign, known), known
+
+
+def in_lines(campaign: Campaign, name: str) -> Campaign:
+    """The same campaign; its progress is a line now and then where standard error has no place for its table.
+
+    Args:
+        campaign: that may have to learn.
+        name: of it.
+    """
+    if sys.stderr is None or not sys.stderr.isatty():
+        campaign.progress = Watch(campaign.options, len(campaign.experiments), name, after=LINE_SECONDS)
+    return campaign
+
+
+def say_if_unlearnt(store: str, campaign: Campaign, name: str) -> None:
+    """Says on standard error that what is learnt to look at a campaign is not kept, if it has to be learnt first.
+
+    Args:
+        store: that nothing is written to.
+        campaign: as the store has it.
+        name: of the campaign.
+    """
+    learnt = len(campaign.history[-1].tests) if campaign.history else 0
+    missing = len(campaign.experiments) - learnt
+    if missing:
+        keeps = to_type("learn", shown_name(store), *(() if name == BEGUN else ("--name", name)))
+        click.echo(
+            f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}. What is learnt now is not kept;"
+            f" to keep it: {keeps}.",
+            err=True,
+        )
 
 
 def check_beside(store: str, campaign: Campaign, name: str) -> None:

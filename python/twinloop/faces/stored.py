@@ -16,7 +16,7 @@ from twinloop.faces.answering import json_option, name_option, next_command, thr
 from twinloop.faces.answers import DO_NOT_FLY
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
-from twinloop.faces.opening import say_if_changed
+from twinloop.faces.opening import in_lines, say_if_changed
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.telling import awaited, counted
@@ -77,7 +77,7 @@ def resume(
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
     """Learn from all recorded flights of a campaign of STORE, as the next ask would, without planning a test."""
     known, _ = heading(store, name)
-    with closing(Campaign.load(store, known, threads=threads)) as campaign:
+    with closing(in_lines(Campaign.load(store, known, threads=threads), known)) as campaign:
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
             _ = campaign.best_test

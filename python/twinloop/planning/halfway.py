@@ -1,9 +1,9 @@
 """Halfway: how far gains may lead from the best ones flown once flights have shown where the twin is wrong.
 
 A flight that came out clearly worse than the best one, and that the twin of now still takes for as good, was a step too
-far for this twin: it has learnt the flight and does not see why. What it promises there is worth nothing, and to fly
-beside it once more would tell what is known. As in methods with a trust region (Conn, Gould and Toint 2000) the next
-steps from the best gains are at most half as long.
+far for this twin: it has learnt the flight and does not see why. So was one that left its envelope and was to keep it.
+What the twin promises there is worth nothing, and to fly beside it once more would tell what is known. As in methods
+with a trust region (Conn, Gould and Toint 2000) the next steps from the best gains are at most half as long.
 """
 
 from __future__ import annotations

@@ -47,7 +47,8 @@ class Flown:
         borne: how many of the last flights whose excitation was held back kept the envelope.
         seen: where the flights have been, as long as no prediction has come true.
         begins: usage of the envelope where the task begins: flights of the task cannot have less.
-        disproved: genes of flights that were clearly worse than the best one, and that the committee takes for as good.
+        disproved: genes of flights that were clearly worse than the best one, or left the envelope, against what the
+            committee says.
     """
 
     best: Floats

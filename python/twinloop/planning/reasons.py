@@ -68,8 +68,8 @@ def reason(why: Why, signals: Signals) -> str:
         sentences.append(what_stays(why.lawless, () if why.repeats else why.untunable))
     if why.halfway and not why.repeats:
         sentences.append(
-            "An earlier flight was clearly worse than the twin predicts it even now: these gains go at most halfway"
-            " from the best ones flown to those of that flight."
+            "An earlier flight was clearly worse than the twin predicts it even now, or left its envelope: these gains"
+            " go at most halfway from the best ones flown to those of that flight."
         )
     if not why.safe:
         sentences.append(

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from committees import TUNED, committee_of, planner_of, signals
+from committees import STEPS, TUNED, committee_of, member, planner_of, signals
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.disproved import disproved
 from twinloop.planning.gusts import Moved
@@ -24,7 +24,7 @@ def found_of(monkeypatch, qualities, good, predicted=None, on_task=True, committ
     ]
     flights = flown or tests
     runs = [[SimpleNamespace(test=test)] for test in flights]
-    book = SimpleNamespace(flown=dict.fromkeys(range(len(tests))), tests=tests)
+    book = SimpleNamespace(flown=dict.fromkeys(range(len(tests))), tests=tests, experiments=[])
     monkeypatch.setattr(standing, "complete", lambda book, number: runs[number])
     monkeypatch.setattr(standing, "measured", lambda book, number: qualities[number])
     monkeypatch.setattr(standing, "on_task", lambda book, test: on_task)
@@ -83,3 +83,51 @@ def test_a_flight_is_held_against_what_was_flown_not_against_what_was_asked(monk
     assert found_of(monkeypatch, [cost], good=good) == [0]
     assert found_of(monkeypatch, [cost], good=good, flown=[flown]) == []
     assert found_of(monkeypatch, [cost], good=good, flown=[replace(asked, predicted=None)]) == []
+
+
+def left_of(monkeypatch, runs, members=None):
+    """Numbers of flights that are found disproved, where none was measured to be worse."""
+    known = signals()
+    planner, committee = planner_of(known, draws=8), committee_of(known)
+    committee = committee if members is None else replace(committee, members=members)
+    flights = [
+        SimpleNamespace(
+            **{"off_start": (), "left_envelope": True, "quality": None, **run}, trajectory=ended(run)
+        )
+        for run in runs
+    ]
+    for number, flight in enumerate(flights):
+        genes = TUNED * (1.0 + 1e-9 * number)
+        flight.test = replace(
+            planner.test(genes, *ends_of(planner)),
+            number=number,
+            predicted=runs[number].get("told", 1.0),
+            spread=0.1,
+        )
+    monkeypatch.setattr(standing, "on_task", lambda book, test: test.number != 9)
+    book = SimpleNamespace(flown={}, tests=[flight.test for flight in flights], experiments=flights)
+    found = disproved(planner, committee, book, 1.0)
+    return [
+        flight.test.number
+        for flight in flights
+        if any(flight.test.genes.tobytes() == other.tobytes() for other in found)
+    ]
+
+
+def ended(run):
+    return SimpleNamespace(ended=run.pop("ended", "completed"), steps=STEPS)
+
+
+def test_a_flight_that_left_against_what_was_promised_is_one_until_the_twin_is_proven_and_foresees_it(
+    monkeypatch,
+):
+    kept = {"left_envelope": False}
+    assert left_of(monkeypatch, [{}, kept, {**kept, "ended": "diverged"}]) == [0, 2]
+    # Nor one that nobody predicted, that was to diverge, or that began elsewhere.
+    assert left_of(monkeypatch, [{"told": None}, {"told": float("inf")}, {"off_start": (0,)}]) == []
+    # Once a flight of other gains has come out as predicted, only one that the committee does not see leave.
+    true = {**kept, "quality": 1.0}
+    assert left_of(monkeypatch, [{}, true]) == [0]
+    runaway = [member(signals(), 1.0, damping=-60.0)] * 3
+    assert left_of(monkeypatch, [{}, true], members=runaway) == []
+    assert left_of(monkeypatch, [true, {}], members=runaway) == [1]

@@ -1,12 +1,17 @@
-"""Disproved: flights that came out clearly worse than the best one, which the twin still takes for as good."""
+"""Disproved: flights that came out worse than the best one, or left, and that the twin does not explain even now."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from twinloop._experiment.envelope import outside
 from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
+from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.track_record import nearly_confirmed_in_a_row
 from twinloop.campaign.logbook import Logbook
 from twinloop.planning.judging import Committee, expected
 from twinloop.planning.planner import Planner
@@ -19,14 +24,20 @@ CLEARLY = 2.0
 def disproved(planner: Planner, committee: Committee, book: Logbook, good: float) -> list[Floats]:
     """Genes of flights that were proposed for what the twin promised, and disproved it.
 
-    What they have cost is no luck of noise or of known disturbances, and the twin that has learnt them does not explain
-    it.
-
     Args:
         planner: of the campaign.
         committee: that judges.
         book: of the campaign.
         good: quality of the best flight; infinite where none has kept the envelope.
+    """
+    return [*_worse(planner, committee, book, good), *_left(planner, committee, book)]
+
+
+def _worse(planner: Planner, committee: Committee, book: Logbook, good: float) -> list[Floats]:
+    """Genes of flights that were clearly worse than the best one, and that the committee still takes for as good.
+
+    What they have cost is no luck of noise or of known disturbances, and the twin that has learnt them does not explain
+    it.
     """
     most = (1.0 + planner.options.worse) * good
     found = []
@@ -43,6 +54,40 @@ def disproved(planner: Planner, committee: Committee, book: Logbook, good: float
         if predicted <= most and quality > predicted + CLEARLY * spread:
             found.append(flown[0].genes)
     return found
+
+
+def _left(planner: Planner, committee: Committee, book: Logbook) -> list[Floats]:
+    """Genes of flights that were to keep the envelope, and left it or diverged.
+
+    A twin that has learnt why foresees it; but what it says of gains as bold is not believed before a flight of new
+    ones has come out as predicted.
+    """
+    proven = nearly_confirmed_in_a_row(book.experiments) > 0
+    gone = [run for run in book.experiments if run.left_envelope or run.trajectory.ended == "diverged"]
+    return [
+        run.test.genes
+        for run in gone
+        if run.test is not None
+        and _was_promised(run)
+        and standing.on_task(book, run.test)
+        and not (proven and _foresees(planner, committee, run.test))
+    ]
+
+
+def _was_promised(run: Experiment) -> bool:
+    """Whether somebody has predicted that it would come to its end, and it began where that was predicted."""
+    predicted = None if run.test is None else run.test.predicted
+    return predicted is not None and math.isfinite(predicted) and not run.off_start
+
+
+def _foresees(planner: Planner, committee: Committee, test: Test) -> bool:
+    """Whether a committee sees the flight of a test leave its envelope more often than not."""
+    excitation = None if test.excitation is None else test.excitation[np.newaxis]
+    judged = planner.judge(
+        committee.members, test.genes[np.newaxis], committee.sds, planner.options.draws, excitation,
+        hold_back=test.hold_back,
+    )  # fmt: skip
+    return bool(2 * outside(judged.usages).sum() > judged.usages.size)
 
 
 def _expected(planner: Planner, committee: Committee, flown: Sequence[Test]) -> tuple[float, float]:

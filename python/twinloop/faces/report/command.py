@@ -12,11 +12,11 @@ from twinloop.faces.answering import answer, json_option, name_option
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture
 from twinloop.faces.files import check_writable
-from twinloop.faces.opening import say_if_changed
+from twinloop.faces.opening import in_lines, say_if_changed, say_if_unlearnt
 from twinloop.faces.report.alike import not_comparable, task_differences
 from twinloop.faces.report.comparison import compared, comparison, comparison_page
 from twinloop.faces.report.page import source_page, templates
-from twinloop.faces.report.source import source
+from twinloop.faces.report.source import Source, source
 from twinloop.faces.text import table
 from twinloop.store import shown_name
 
@@ -40,11 +40,20 @@ def report(campaign: str, name: str | None, output: Path | None, form: str | Non
     path = Path("report.html") if output is None else output
     check_writable(path, [".html"])
     templates()  # what is missing is said before any work
-    found = source(campaign, name)
-    say_if_changed(campaign, found.campaign, found.name)
+    found = _opened(campaign, name)
     text = source_page(found)
     write_whole(path, text)
     answer({"files": [str(path)]}, f"Report: {path}", as_json, err=True)
+
+
+def _opened(where: str, name: str | None) -> Source:
+    """A campaign to look at; what it was begun with, what is not kept, and its progress are said beside it."""
+    found = source(where, name)
+    say_if_changed(where, found.campaign, found.name)
+    if found.sessions and not found.campaign.interrupted:  # a record in a file has none, and nothing keeps it
+        say_if_unlearnt(where, found.campaign, found.name)
+    in_lines(found.campaign, found.name)
+    return found
 
 
 def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[str]:
@@ -56,8 +65,7 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[s
                 " another one."
             )
         folder.mkdir()
-    found = source(campaign, name)
-    say_if_changed(campaign, found.campaign, found.name)
+    found = _opened(campaign, name)
     examined, files = found.campaign.examine(), []
     for figure_name, drawn in FIGURES.items():
         figure = drawn(examined)
@@ -87,9 +95,7 @@ def compare(first: str, second: str, names: tuple[str, ...], output: Path | None
         check_writable(output, [".html"])
         templates()
     chosen = (names or (None,)) * 2 if len(names) < 2 else names
-    sources = [source(where, name) for where, name in zip((first, second), chosen, strict=False)]
-    for where, each in zip((first, second), sources, strict=True):
-        say_if_changed(where, each.campaign, each.name)
+    sources = [_opened(where, name) for where, name in zip((first, second), chosen, strict=False)]
     names_shown, answers = [each.name for each in sources], compared(sources)
     if len(set(names_shown)) == 1:  # such as "campaign", which each has that nobody named
         names_shown = [shown_name(where) for where in (first, second)]
