@@ -57,6 +57,24 @@ def test_the_twin_is_that_of_the_package_and_is_judged_on_the_log_held_out(folde
     assert found["logs"][2]["fit"] == pytest.approx(fits) and min(fits.values()) > 90.0
 
 
+def test_a_log_held_out_that_the_twin_does_not_predict_is_said_and_the_twin_is_not_taken_away(folder):
+    run = by_hand(60, seed=2)
+    turned = dict(zip(("angle", "rate"), run.states.T, strict=True))
+    write_columns(folder / "other.csv", {"t": run.t, **turned, "torque": -run.commands[:, 0]})
+    doubted = str(folder / "doubted.json")
+    found = identified(
+        folder, "--held-out", str(folder / "2.csv"), "--held-out", str(folder / "other.csv"), "-o", doubted
+    )
+    assert found.exit_code == 0
+    (said,) = [line for line in found.stdout.splitlines() if line.startswith("serious: ")]
+    assert "does not predict other.csv, which was held out: error " in said
+    refused = invoke("export", doubted, "--to", "c", "-o", str(folder / "doubted.c"))
+    assert refused.exit_code == 1 and "does not predict other.csv" in refused.stderr
+    assert not (folder / "doubted.c").exists()
+    forced = invoke("export", doubted, "--to", "c", "-o", str(folder / "doubted.c"), "--force")
+    assert forced.exit_code == 0 and (folder / "doubted.c").exists()
+
+
 def test_as_text_it_is_equations_and_a_table(folder):
     said = identified(folder).stdout
     assert "d angle / dt = rate" in said and "FIT angle (%)" in said and "held out" not in said

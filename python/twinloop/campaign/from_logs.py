@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from twinloop._ground.texts import two_digits
 from twinloop.campaign.campaign import Campaign
 from twinloop.campaign.data.copies import copied
-from twinloop.campaign.history import Progress
+from twinloop.campaign.examination.checking import LEFT
+from twinloop.campaign.examination.unseen import TwinBefore, Unseen, unseen_flights
+from twinloop.campaign.history import Progress, called
 from twinloop.controllers import StateFeedback
 from twinloop.errors import InvalidInput
 from twinloop.law.twin import Twin
+from twinloop.remarks import Remark, serious
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory, equal_runs
 
@@ -56,6 +61,8 @@ def learnt_from_logs(
     progress: Callable[[Progress], None] | bool | None = True,
 ) -> tuple[Twin, Campaign]:
     """The twin of `identify`, and the campaign behind it to be examined; what that says of a controller means nothing.
+
+    A run that was held out and that the twin does not predict is a serious remark on it.
 
     Args:
         runs: at least one, at the signals' period; SI units, radians.
@@ -108,7 +115,27 @@ def learnt_from_logs(
     for run, name in zip(apart, names[len(found) :], strict=True):
         campaign.attach(run, name)
     campaign.interrupted = True  # what was learnt so far is enough
-    return twin, campaign
+    unseen = unseen_flights(campaign.experiments, [TwinBefore(len(found), twin)], campaign.setup)
+    return twin.remarked(_not_predicted(unseen, called(campaign.experiments))), campaign
+
+
+def _not_predicted(unseen: Sequence[Unseen], names: Sequence[str]) -> list[Remark]:
+    """A remark on each run that was held out and that the twin does not predict.
+
+    Args:
+        unseen: the runs that were held out.
+        names: of all runs.
+    """
+    return [
+        serious(
+            "held-out",
+            f"The twin does not predict {names[run.place]}, which was held out:"
+            f" {f'error {two_digits(run.error)}' if math.isfinite(run.error) else 'it diverges'}, at most {LEFT:g} is"
+            " allowed (0 is perfect, 1 a model that never moves). What it has learnt may hold for its own logs alone.",
+        )
+        for run in unseen
+        if not run.error <= LEFT
+    ]
 
 
 def _listed(runs: object) -> list[Trajectory]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Iterable, Sequence
 from functools import cached_property
@@ -220,6 +221,16 @@ class Twin(Shown, Value, Recorded, kind="twin"):
     def without_flights(self) -> Twin:
         """The same model alone, without flights, errors and committee: it does not warn of runs beyond the flights."""
         return Twin(self.model, self.signals, limits=self._limits, noise=self.noise)
+
+    def remarked(self, remarks: Iterable[Remark]) -> Twin:
+        """The same twin with further diagnostics.
+
+        Args:
+            remarks: what else there is to say of it.
+        """
+        found = copy.copy(self)
+        found.remarks = (*self.remarks, *remarks)
+        return found
 
     def equations(self, digits: int = 6) -> str:
         """The twin as text, which SymPy reads as well if its `locals` have a symbol for each name.
