@@ -1,5 +1,6 @@
 """Progress that a campaign shows by itself: a table on a terminal, nothing elsewhere, and no other result."""
 
+import contextlib
 import os
 import pty
 import sys
@@ -8,7 +9,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from lives import made, plain
+import twinloop as tl
+from lives import begun, made, plain
 from twinloop.campaign.own_progress import TERMINAL
 
 
@@ -85,6 +87,15 @@ def test_it_can_be_switched_off(terminal, pendulum, off):
     with terminal() as screen:
         made(progress=off).run(pendulum, 2)
     assert screen.text == ""
+
+
+def test_what_is_asked_of_a_campaign_that_was_learnt_before_counts_its_experiments(tmp_path):
+    store, seen = tmp_path / "rig.db", []
+    with contextlib.closing(begun(store=store)) as campaign:
+        assert campaign.twin.errors
+    with contextlib.closing(tl.Campaign.load(store, threads=1, progress=seen.append)) as campaign:
+        campaign.ask()
+    assert seen and {progress.experiments for progress in seen} == {1}
 
 
 def test_without_a_terminal_nothing_is_shown(capfd, pendulum):

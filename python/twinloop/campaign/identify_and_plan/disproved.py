@@ -63,21 +63,28 @@ def _left(planner: Planner, committee: Committee, book: Logbook) -> list[Floats]
     ones has come out as predicted.
     """
     proven = nearly_confirmed_in_a_row(book.experiments) > 0
-    gone = [run for run in book.experiments if run.left_envelope or run.trajectory.ended == "diverged"]
+    left = [run.test for run in book.experiments if run.test is not None and _left_against_promise(run)]
     return [
-        run.test.genes
-        for run in gone
-        if run.test is not None
-        and _was_promised(run)
-        and standing.on_task(book, run.test)
-        and not (proven and _foresees(planner, committee, run.test))
+        test.genes
+        for test in left
+        if standing.on_task(book, test) and not (proven and _foresees(planner, committee, test))
     ]
 
 
-def _was_promised(run: Experiment) -> bool:
-    """Whether somebody has predicted that it would come to its end, and it began where that was predicted."""
+def shaken(book: Logbook) -> bool:
+    """Whether the last flight was to keep the envelope, and left it or diverged: what is known to fly comes first then.
+
+    Args:
+        book: of the campaign.
+    """
+    return bool(book.experiments) and _left_against_promise(book.experiments[-1])
+
+
+def _left_against_promise(run: Experiment) -> bool:
+    """Whether a flight left or diverged that was predicted to come to its end, and began where that was predicted."""
     predicted = None if run.test is None else run.test.predicted
-    return predicted is not None and math.isfinite(predicted) and not run.off_start
+    promised = predicted is not None and math.isfinite(predicted) and not run.off_start
+    return promised and (run.left_envelope or run.trajectory.ended == "diverged")
 
 
 def _foresees(planner: Planner, committee: Committee, test: Test) -> bool:

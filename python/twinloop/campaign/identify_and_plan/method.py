@@ -21,7 +21,7 @@ from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice
-from twinloop.campaign.identify_and_plan.disproved import disproved
+from twinloop.campaign.identify_and_plan.disproved import disproved, shaken
 from twinloop.campaign.identify_and_plan.inside import inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
@@ -129,9 +129,10 @@ class IdentifyAndPlan:
 
         def from_all_in(book: Logbook) -> None:
             latest, experiments = self.memory.latest, len(book.experiments)
+            # Also of what is known already something may be asked that takes a while.
+            self._tests = tuple(run.number for run in book.experiments)
             if latest is not None and (at_once or latest.experiments == experiments):
                 return
-            self._tests = tuple(run.number for run in book.experiments)
             asked, begun = self.memory.asked, self.memory.under_way
             under_way = begun[1] if begun is not None and begun[0] == experiments else None
             learnt = self.learner.learnt(book, asked, under_way, partial(self._keep, experiments))
@@ -284,6 +285,7 @@ class IdentifyAndPlan:
             seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
             begins=float(usages_of(self.setup.signals, self.setup.initial_state[np.newaxis]).max()),
             disproved=() if good is None else disproved(self.planner, committee, book, good),
+            shaken=shaken(book),
         )
 
     def _seen(self, book: Logbook) -> Seen:
