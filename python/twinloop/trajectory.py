@@ -161,8 +161,8 @@ def check_period(trajectory: Trajectory, signals: Signals) -> None:
             f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s after",
             worst,
             f", t = {moment(trajectory.t[worst], signals.dt)} s; put in a row that was lost, give t in s, or declare"
-            " the system's own period as dt. Where the loop only jitters around it, pass the even times"
-            " dt * np.arange(n + 1).",
+            " the system's own period as dt. Where the loop only jitters around it, bring the log onto even times with"
+            " twinloop check --even, or pass dt * np.arange(n + 1).",
         )
 
 

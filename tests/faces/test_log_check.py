@@ -212,10 +212,22 @@ def test_times_that_jitter_around_their_period_are_no_other_period(checked, step
 
     said = checked(change)
     assert said.exit_code == 1 and "apart" not in said.stdout and "missing" not in said.stdout
-    assert f"departs by up to {worst} % from dt" in said.stdout and "write even times" in said.stdout
+    assert f"departs by up to {worst} % from dt" in said.stdout and "twinloop check --even" in said.stdout
     found = json.loads(checked(change, "--json").stdout)
     assert {each["code"] for each in found["remarks"]} == {"jitter"} and found["gaps"] == 0
     assert found["period"] == pytest.approx(0.05, rel=0.01) and found["jitter"] == pytest.approx(worst / 100)
+
+
+def test_times_that_jitter_are_brought_onto_the_period_and_a_part_is_taken(checked, tmp_path):
+    log = tmp_path / "even.csv"
+    said = checked(spaced(0.055, 0.045), "--even", "-o", str(log))
+    assert said.exit_code == 0 and "were brought onto it" in said.stdout and "departs" not in said.stdout
+    columns = np.genfromtxt(log, delimiter=",", names=True)
+    assert np.allclose(np.diff(columns["t"]), 0.05)
+    part = checked(lambda log: None, "--from", "1", "--to", "3", "-o", str(tmp_path / "part.csv"))
+    assert part.exit_code == 0, part.output
+    columns = np.genfromtxt(tmp_path / "part.csv", delimiter=",", names=True)
+    assert columns["t"][[0, -1]] == pytest.approx([1.0, 3.0]) and len(columns) == 41
 
 
 @pytest.mark.parametrize(

@@ -17,21 +17,26 @@ from twinloop.faces.answering import json_option
 from twinloop.faces.files import check_writable
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.text import table
-from twinloop.logs import TIME, Window, read_log, write_columns
+from twinloop.logs import TIME, Window, evenly, read_log, write_columns
 from twinloop.unmeasured import columns_of, names_of
 
 
 @click.command()
 @click.argument("log", type=Path)
 @click.argument("config", type=Path, metavar="FILE.toml")
-@click.option(
-    "--from", "start", type=float, metavar="S", help="For a .ulg: first time, s after its beginning."
-)
-@click.option("--to", "stop", type=float, metavar="S", help="For a .ulg: last time, s after its beginning.")
+@click.option("--from", "start", type=float, metavar="S", help="Only from so many s after its beginning on.")
+@click.option("--to", "stop", type=float, metavar="S", help="Only until so many s after its beginning.")
+@click.option("--even", is_flag=True, help="Bring times that jitter onto the period dt first.")
 @click.option("-o", "--output", type=Path, metavar="FILE.csv", help="Also write the log as CSV, for tell.")
 @json_option
 def check(
-    log: Path, config: Path, start: float | None, stop: float | None, output: Path | None, as_json: bool
+    log: Path,
+    config: Path,
+    start: float | None,
+    stop: float | None,
+    even: bool,
+    output: Path | None,
+    as_json: bool,
 ) -> int:
     """Check a LOG, as CSV, .npz or .ulg, before it is used: clock, gaps, sensors, commands and units.
 
@@ -46,6 +51,9 @@ def check(
     t = _numbers(f"{name}, t", read.t, np.shape(read.t)[:1])
     states = _numbers(f"{name}, states", read.states, (rows, columns_of(read.states, signals)))
     commands = _numbers(f"{name}, commands", read.commands, (max(0, rows - 1), signals.n_u))
+    if even:
+        read = evenly(dataclasses.replace(read, t=t, states=states, commands=commands))
+        t, states, commands = read.t, read.states, read.commands
     found = check_log(t, states, commands, signals, read.lines)
     found = dataclasses.replace(found, remarks=(*read.remarks, *found.remarks))
     if as_json:

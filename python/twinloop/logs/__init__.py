@@ -1,7 +1,8 @@
 """Logs of flights, read and written."""
 
+from twinloop.logs.even_times import evenly
 from twinloop.logs.files import MOST_BYTES, Log, load, read_log, write_columns
+from twinloop.logs.samples import Window
 from twinloop.logs.table import TIME
-from twinloop.logs.ulog import Window
 
-__all__ = ["MOST_BYTES", "TIME", "Log", "Window", "load", "read_log", "write_columns"]
+__all__ = ["MOST_BYTES", "TIME", "Log", "Window", "evenly", "load", "read_log", "write_columns"]

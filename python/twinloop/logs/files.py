@@ -18,10 +18,12 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.times import moment
 from twinloop._ground.writing import write_whole
 from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
+from twinloop.logs.even_times import part_of
 from twinloop.logs.headers import advice, as_called, listed, remarks_on, renamed
 from twinloop.logs.missing import filled
+from twinloop.logs.samples import Window
 from twinloop.logs.table import TIME, Row, number_in, refuse_cut, refuse_longer, rows_of
-from twinloop.logs.ulog import Window, read_ulog
+from twinloop.logs.ulog import read_ulog
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -119,8 +121,9 @@ def load(
         columns: of a `.ulg` the field of each state and command, such as {"roll": "vehicle_attitude.roll", "motor":
             "actuator_outputs/1.output[0]"}; of a CSV file the column of `t`, a state or a command that has another
             name there, such as {"t": "Time", "roll": "Roll (rad)"}. All are in the units of the signals.
-        start: of a `.ulg`, s after its beginning; None: when all fields have begun.
-        stop: of a `.ulg`, s after its beginning; None: when the first field ends.
+        start: of the part that is meant, s after the first row, or after the beginning of a `.ulg`; None: as soon as
+            all that is wanted is there.
+        stop: of it, likewise; None: as long as all that is wanted is there.
 
     Returns:
         The flight.
@@ -149,11 +152,11 @@ def read_log(
         signals: names of the columns, and the order of states and commands.
         name: of the log in messages; None: its path.
         columns: of a `.ulg` the field of each state and command; of a CSV file the columns that have other names.
-        window: of a `.ulg`, the part that is meant.
+        window: the part that is meant, in s after the first row, or after the beginning of a `.ulg`.
 
     Raises:
-        InvalidInput: no such file, a column that is missing, something that is no number, or `columns` and a part of a
-            log that is no `.ulg`.
+        InvalidInput: no such file, a column that is missing, something that is no number, or a part with next to no
+            rows.
         NotAvailable: a `.ulg` without the package pyulog.
     """
     path = Path(path)
@@ -163,10 +166,6 @@ def read_log(
         if path.suffix.lower() == ".ulg":
             t, states, commands, remarks = read_ulog(path, called, signals, columns, window)
             return Log(called, signals, t, states, commands, None, remarks)
-        if window != WHOLE:
-            raise InvalidInput(
-                f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."
-            )
         t, states, commands, lines, said = (
             (*_arrays(path, called), None, ())
             if path.suffix.lower() == ".npz"
@@ -178,7 +177,7 @@ def read_log(
         ) from reason
     states, remarks = _completed(states, signals)
     sent = commands[:-1] if len(commands) == len(t) else commands
-    return Log(called, signals, t, states, sent, lines, (*remarks, *said))
+    return part_of(Log(called, signals, t, states, sent, lines, (*remarks, *said)), window)
 
 
 def _completed(readings: Floats, signals: Signals) -> tuple[Floats, tuple[Remark, ...]]:

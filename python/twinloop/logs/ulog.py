@@ -6,25 +6,22 @@ import contextlib
 import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.logs.samples import Samples, Window, held, interpolated, refuse_gaps, without_jumps
 from twinloop.remarks import Remark, note
-from twinloop.signals import TURNS, Signals, State
+from twinloop.signals import Signals
 from twinloop.unmeasured import logged
 
 ADDRESS = re.compile(r"([a-z0-9_]+)(?:/([0-9]{1,3}))?\.(\S+)", re.ASCII | re.IGNORECASE)
 """A topic, which of several of that name, and a field: "vehicle_attitude.roll", "sensor_gyro/1.x"."""
 EULER = ("roll", "pitch", "yaw")
 """Angles that stand in no field and are made of a topic's quaternion q, which turns by yaw, then pitch, then roll."""
-APART = 2.0
-"""Periods by which two samples of a field may be apart: between them nobody knows what was."""
 HEADER = 3
 """Bytes before each message: its size (2), and its kind."""
 KINDS = frozenset(bytes([kind]) for kind in b"ABCDFILMOPQRS")
@@ -33,19 +30,6 @@ LONGEST = 10_000
 """Bytes of a message; one that is longer is taken for damage, as by pyulog."""
 MOST_FIELDS = 20_000
 """Of a topic, arrays and nested ones unfolded: a few bytes of a file could ask for billions."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """The part of a log that is meant.
-
-    Args:
-        start: seconds after its beginning; None: as soon as all fields are there.
-        stop: seconds after its beginning; None: as long as all fields are there.
-    """
-
-    start: float | None = None
-    stop: float | None = None
 
 
 class _Watched(io.BufferedReader):
@@ -68,15 +52,6 @@ class _Watched(io.BufferedReader):
                 self.damaged = header[2:] not in KINDS or len(data) > LONGEST
         self._before = data
         return data
-
-
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """A field as it was logged: times (m,) in s after the beginning of the log, values (m,)."""
-
-    address: str
-    times: Floats
-    values: Floats
 
 
 def read_ulog(
@@ -106,16 +81,16 @@ def read_ulog(
     found = {name: _samples(log, called, *fields[name]) for name in names}
     start, stop = _common(called, list(found.values()), window, signals.dt)
     for samples in found.values():
-        _refuse_gaps(called, samples, start, stop, signals.dt)
+        refuse_gaps(called, samples, start, stop, signals.dt)
     count = int((stop - start) / signals.dt + 1e-6)
     times = np.asarray(start + signals.dt * np.arange(count + 1), dtype=np.float64)
-    states = [_interpolated(found[state.name], state, times) for state in wanted]
-    commands = [_held(found[name], times[:-1]) for name in signals.command_names]
+    states = [interpolated(found[state.name], state, times) for state in wanted]
+    commands = [held(found[name], times[:-1]) for name in signals.command_names]
     remarks = [_ends_early(found.values())] if cut and window.stop is None else []
     return times - start, np.stack(states, axis=1), np.stack(commands, axis=1), tuple(remarks)
 
 
-def _ends_early(found: Iterable[_Samples]) -> Remark:
+def _ends_early(found: Iterable[Samples]) -> Remark:
     until = max(float(samples.times[-1]) for samples in found)
     return note(
         "cut",
@@ -193,7 +168,7 @@ def _parsed(path: Path, called: str, topics: list[str]) -> tuple[Any, bool]:
     return log, file.cut
 
 
-def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _Samples:
+def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> Samples:
     same = [data for data in log.data_list if data.name == topic]
     if not same:
         raise _no_samples(log, called, topic)
@@ -218,7 +193,7 @@ def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _S
         raise InvalidInput(f"{expected}, found some before the log begins; take another log.")
     times = (micro - np.uint64(log.start_timestamp)).astype(np.float64) * 1e-6
     _refuse_disorder(expected, times)
-    return _Samples(address, times, values)
+    return Samples(address, times, values)
 
 
 def _no_samples(log: Any, called: str, topic: str) -> InvalidInput:
@@ -263,18 +238,10 @@ def _angle(name: str, w: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
         angle = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     else:
         angle = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return np.round(_without_jumps(angle, 2.0 * np.pi), 12)
+    return np.round(without_jumps(angle, 2.0 * np.pi), 12)
 
 
-def _without_jumps(values: Floats, turn: float) -> Floats:
-    """Values that take the short way from one to the next; one that is no number changes none behind it."""
-    found = values.copy()
-    known = np.isfinite(values)
-    found[known] = np.unwrap(values[known], period=turn)
-    return found
-
-
-def _common(called: str, found: Sequence[_Samples], window: Window, dt: float) -> tuple[float, float]:
+def _common(called: str, found: Sequence[Samples], window: Window, dt: float) -> tuple[float, float]:
     """From when to when all fields are there, within what is meant."""
     first, last = max(each.times[0] for each in found), min(each.times[-1] for each in found)
     start = first if window.start is None else window.start
@@ -285,26 +252,3 @@ def _common(called: str, found: Sequence[_Samples], window: Window, dt: float) -
             f" after its beginning, where all fields are there, found {start:.6g} to {stop:.6g} s; name another one."
         )
     return float(start), float(stop)
-
-
-def _refuse_gaps(called: str, samples: _Samples, start: float, stop: float, dt: float) -> None:
-    inside: NDArray[np.bool_] = (samples.times[1:] > start) & (samples.times[:-1] < stop)
-    gaps = np.where(inside, np.diff(samples.times), 0.0)
-    place = int(np.argmax(gaps))
-    if gaps[place] > APART * dt * (1.0 + 1e-6):
-        raise InvalidInput(
-            f"Log {called}: expected samples of {samples.address} at most {APART:g} periods ({1e3 * APART * dt:g} ms)"
-            f" apart, found {1e3 * gaps[place]:.4g} ms after {samples.times[place]:.6g} s; log it more often, choose a"
-            " longer dt, or a part without that gap."
-        )
-
-
-def _interpolated(samples: _Samples, state: State, times: Floats) -> Floats:
-    """Values between samples; of an angle that wraps between two of them by the short way, so that it jumps nowhere."""
-    turn = state.period or TURNS.get(state.unit)
-    values = samples.values if turn is None else _without_jumps(samples.values, turn)
-    return np.asarray(np.interp(times, samples.times, values))
-
-
-def _held(samples: _Samples, times: Floats) -> Floats:
-    return samples.values[np.searchsorted(samples.times, times + 1e-9, side="right") - 1]

@@ -73,7 +73,7 @@ class Comparison:
         )
         self.possible = self._possible()
         within = self.possible & (self.quiet.worst_usage <= reach)
-        self.keeps = within & self._bears_delay() & self._near_what_was_seen() & self._halfway & self._known
+        self.keeps = within & self._bears_delay() & self._near_what_was_seen() & self._halfway
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -181,12 +181,6 @@ class Comparison:
         beyond = beyond_halfway(self.judge.family, self.drafts.genes, flown.best, flown.disproved)
         return np.asarray(beyond == 0.0)
 
-    @cached_property
-    def _known(self) -> Flags:
-        """Candidates that fly what is known to fly, if the last flight has shaken what is believed of others."""
-        repeats = np.arange(len(self.possible)) >= self.drafts.repeats
-        return repeats if self.flown.shaken and self.flown.flies else np.ones_like(self.possible)
-
     def _most(self) -> float:
         """Predicted quality that any flight may have at most; one for the model may cost as much again."""
         # Where no flight has kept the envelope, one that does may be worse than what is promised.
@@ -285,7 +279,6 @@ class Comparison:
             lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
             untunable=tuple(self.judge.family.names[i] for i in self.committee.untunable),
             halfway=bool(self._halfway[chosen]) and not self._halfway.all(),
-            shaken=self.flown.shaken and repeats,
         )
 
 

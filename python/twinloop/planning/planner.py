@@ -237,8 +237,7 @@ class Planner(Judge):
         wanted = Wanted(goal, number, exploit, last=last)
         found = self._compared(committee, tuned, flown, wanted)
         self.watch("candidates")
-        searched = self.options.within and committee.predicts_limits and not flown.shaken
-        if searched and found.possible[0] and not found.keeps[0]:
+        if self.options.within and committee.predicts_limits and found.possible[0] and not found.keeps[0]:
             found = self._within(found)
         proposal = found.proposal()
         as_wanted = proposal.excitation is None and proposal.genes.tobytes() == tuned.tobytes()

@@ -49,7 +49,6 @@ class Flown:
         begins: usage of the envelope where the task begins: flights of the task cannot have less.
         disproved: genes of flights that were clearly worse than the best one, or left the envelope, against what the
             committee says.
-        shaken: whether the last flight left its envelope against what was predicted.
     """
 
     best: Floats
@@ -63,7 +62,6 @@ class Flown:
     seen: Seen | None = None
     begins: float = 0.0
     disproved: Sequence[Floats] = ()
-    shaken: bool = False
 
 
 @dataclass(frozen=True)

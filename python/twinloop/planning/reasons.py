@@ -34,7 +34,6 @@ class Why:
         lawless: names of states of which no law is known.
         untunable: names of the gains that cannot be tuned for that.
         halfway: whether some candidates lead too far towards gains of flights that the twin is wrong about.
-        shaken: whether gains that have flown fly again because the last flight left against what was predicted.
     """
 
     trusted: bool
@@ -55,7 +54,6 @@ class Why:
     lawless: tuple[str, ...] = ()
     untunable: tuple[str, ...] = ()
     halfway: bool = False
-    shaken: bool = False
 
 
 def reason(why: Why, signals: Signals) -> str:
@@ -68,8 +66,6 @@ def reason(why: Why, signals: Signals) -> str:
     sentences = [_what_flies(why), _what_it_tells(why, signals)]
     if why.trusted and why.gains_count and why.lawless:
         sentences.append(what_stays(why.lawless, () if why.repeats else why.untunable))
-    if why.shaken:
-        sentences.append("The last flight left its envelope, which the twin had not foreseen.")
     if why.halfway and not why.repeats:
         sentences.append(
             "An earlier flight was clearly worse than the twin predicts it even now, or left its envelope: these gains"

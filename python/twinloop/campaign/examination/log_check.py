@@ -237,7 +237,7 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
         yield serious(
             "jitter",
             f"The time between two rows departs by up to {two_digits(100.0 * worst)} % from dt; {100.0 * JITTER:g} %"
-            " are allowed. Where the loop only jitters around its period, write even times.",
+            " are allowed. Where the loop only jitters around its period, twinloop check --even brings times onto it.",
         )
 
 

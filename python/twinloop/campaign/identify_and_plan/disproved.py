@@ -71,15 +71,6 @@ def _left(planner: Planner, committee: Committee, book: Logbook) -> list[Floats]
     ]
 
 
-def shaken(book: Logbook) -> bool:
-    """Whether the last flight was to keep the envelope, and left it or diverged: what is known to fly comes first then.
-
-    Args:
-        book: of the campaign.
-    """
-    return bool(book.experiments) and _left_against_promise(book.experiments[-1])
-
-
 def _left_against_promise(run: Experiment) -> bool:
     """Whether a flight left or diverged that was predicted to come to its end, and began where that was predicted."""
     predicted = None if run.test is None else run.test.predicted

@@ -21,7 +21,7 @@ from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice
-from twinloop.campaign.identify_and_plan.disproved import disproved, shaken
+from twinloop.campaign.identify_and_plan.disproved import disproved
 from twinloop.campaign.identify_and_plan.inside import inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
@@ -285,15 +285,18 @@ class IdentifyAndPlan:
             seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
             begins=float(usages_of(self.setup.signals, self.setup.initial_state[np.newaxis]).max()),
             disproved=() if good is None else disproved(self.planner, committee, book, good),
-            shaken=shaken(book),
         )
 
     def _seen(self, book: Logbook) -> Seen:
         """Where the flights have been, and where the task leads."""
         setup = self.setup
         ends = np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
-        flights = inside(without_wrong_readings(book.experiments, setup.signals))
-        return Seen(standing.read_in(book, flights), np.stack([ends.min(axis=0), ends.max(axis=0)]))
+        every = without_wrong_readings(book.experiments, setup.signals)
+        # Where one has left is no place where flights are known to be well.
+        flights = [run for run in every if not (run.left_envelope or run.trajectory.ended == "diverged")]
+        return Seen(
+            standing.read_in(book, flights or inside(every)), np.stack([ends.min(axis=0), ends.max(axis=0)])
+        )
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
