@@ -472,6 +472,26 @@ def test_gains_must_bear_that_what_states_do_ends_where_flights_and_task_were_or
     assert abs(moved(method._committee(book).members[0], 10.0) - moved(ended, 10.0)) > 0.1
 
 
+def test_where_a_flight_has_left_is_no_place_where_flights_have_been(begin, pendulum):
+    known = replace(SIGNALS, states=[replace(SIGNALS.states[0], envelope=(-1.5, 2.5)), SIGNALS.states[1]])
+    campaign = told(begin(signals=known), pendulum)
+    seen = campaign._method._seen(campaign._book)
+    test = campaign.test(PENDULUM_GAINS)
+    run = pendulum.run(test)
+    far = run.states.copy()
+    far[14:, 0] += 3.0
+    lost = tl.Trajectory(run.t, far, run.commands, ended="aborted", reason="it was lost")
+    campaign.tell(test, lost)
+    assert campaign.experiments[-1].left_envelope
+    assert same_bits(campaign._method._seen(campaign._book).flights, seen.flights)
+    # Where all have left, there is nothing else to go by than what was inside.
+    alone = begin(signals=known)
+    first = alone.test(PENDULUM_GAINS)
+    alone.tell(first, lost)
+    low, high = alone._method._seen(alone._book).flights
+    assert low[0] >= -1.5 and high[0] <= 2.5 and (low <= high).all()
+
+
 def test_without_the_option_nothing_ends(begin, pendulum):
     campaign = begin(options={"ends": False})
     test = campaign.test(PENDULUM_GAINS)
