@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import twinloop as tl
 from browser import SIZES, browser, kept, opened, serious
+from command import invoke
 from conftest import PENDULUM_GAINS
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign.certificate import Use, certificate
@@ -148,6 +149,29 @@ def test_a_controller_that_fails_a_check_is_refused_and_sets_nothing(flown, tmp_
     said = json.loads((tmp_path / "made" / "certificate.json").read_text())
     assert not said["granted"] and said["autopilot"]["files"] == {}
     assert "Do not fly these gains" in Page((tmp_path / "made" / "certificate.html").read_text()).text
+
+
+def test_what_has_to_be_learnt_to_look_is_said_not_to_be_kept_until_learn_has_kept_it(tmp_path):
+    pytest.importorskip("sqlalchemy")
+    campaign = rig_campaign()
+    first = campaign.test(PENDULUM_GAINS)
+    campaign.tell(first, plant().run(first))
+    store = tmp_path / "young.db"
+    campaign.save(store)
+    said = (
+        f"Not learnt yet: 1 experiment. What is learnt now is not kept; to keep it: twinloop learn {store}."
+    )
+    looks = [
+        lambda: certify(store, tmp_path / "made"),
+        lambda: invoke("export", str(store), "--to", "json", "--force"),
+        lambda: invoke(
+            "export", str(store), "controller", "--to", "c", "-o", str(tmp_path / "c.c"), "--force"
+        ),
+        lambda: invoke("report", str(store), "-o", str(tmp_path / "page.html")),
+    ]
+    assert [look().stderr.count(said) for look in looks] == [1, 1, 1, 1]
+    assert invoke("learn", str(store), "--threads", "1").exit_code == 0
+    assert [look().stderr.count("Not learnt yet") for look in looks] == [0, 0, 0, 0]
 
 
 def test_earlier_gains_are_gone_though_the_page_cannot_be_made(flown, tmp_path, monkeypatch):

@@ -14,6 +14,7 @@ from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.certificate import facts, page
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
+from twinloop.faces.opening import not_kept
 from twinloop.faces.result import to_json
 from twinloop.store import shown_name
 
@@ -40,8 +41,11 @@ def certify(
     """
     given = prepared(store, name, kind, mapping)
     campaign, autopilot = given.campaign, given.autopilot
+    unkept = not_kept(store, campaign, given.name)
     found = campaign.certificate()
     texts = _parameter_files(found, autopilot)
+    if unkept:
+        click.echo(unkept, err=True)
     output.mkdir(parents=True, exist_ok=True)
     # Earlier gains are no longer certified, whatever happens now.
     for suffix in {form.suffix for form in FORMATS.values()}:

@@ -83,7 +83,8 @@ def export(
             raise InvalidInput(
                 "Export: expected a store with a campaign, found JSON, which holds a twin alone."
             )
-        held, _ = opened_to_look(source, name)
+        held, known = opened_to_look(source, name)
+        say_if_unlearnt(source, held, known)
         made = held.export_controller(to, kind=of_file, precision=precision, force=force)
     if isinstance(made, str):
         answer({"kind": kind, "text": made}, made.removesuffix("\n"), as_json)

@@ -81,7 +81,6 @@ def opened_to_look(store: str, name: str | None) -> tuple[Campaign, str]:
     known = look(store, name, read_only=True).name
     campaign = Campaign.load(store, known, read_only=True)
     check_beside(store, campaign, known)
-    say_if_unlearnt(store, campaign, known)
     return in_lines(campaign, known), known
 
 
@@ -105,15 +104,28 @@ def say_if_unlearnt(store: str, campaign: Campaign, name: str) -> None:
         campaign: as the store has it.
         name: of the campaign.
     """
+    said = not_kept(store, campaign, name)
+    if said:
+        click.echo(said, err=True)
+
+
+def not_kept(store: str, campaign: Campaign, name: str) -> str:
+    """That what is learnt to look at a campaign is not kept, if it has to be learnt first; empty where not.
+
+    Args:
+        store: that nothing is written to.
+        campaign: as the store has it.
+        name: of the campaign.
+    """
     learnt = len(campaign.history[-1].tests) if campaign.history else 0
     missing = len(campaign.experiments) - learnt
-    if missing:
-        keeps = to_type("learn", shown_name(store), *(() if name == BEGUN else ("--name", name)))
-        click.echo(
-            f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}. What is learnt now is not kept;"
-            f" to keep it: {keeps}.",
-            err=True,
-        )
+    if not missing:
+        return ""
+    keeps = to_type("learn", shown_name(store), *(() if name == BEGUN else ("--name", name)))
+    return (
+        f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}. What is learnt now is not kept;"
+        f" to keep it: {keeps}."
+    )
 
 
 def check_beside(store: str, campaign: Campaign, name: str) -> None:

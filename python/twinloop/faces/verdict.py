@@ -304,7 +304,7 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
         )
         return Sentence("Next", answers.FLY_ANOTHER, None, text, (("remarks", "remarks"), *links))
     failed = [check for check in checks.failed if check.subject == "controller"]
-    if failed and found.best is not None and (advice["stop"] or advice["gain"] == 0.0):
+    if failed and (advice["stop"] or advice["gain"] == 0.0):
         knows = "The twin knows enough: another flight would hardly improve the quality."
         if found.margins is None:
             text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"

@@ -119,7 +119,7 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
         yield Check(
             "unseen-flight", "twin", None, LEFT, False, True,
             "There is no experiment that the twin has not learnt from, so its error on a new"
-            " one is unknown. Fly one more.",
+            " one is unknown. Fly one more that is planned on what was learnt of those before.",
         )  # fmt: skip
         return
     last = found.unseen[-1]
