@@ -22,7 +22,7 @@ from twinloop.campaign.cost import Cost, cost
 from twinloop.campaign.entering import attached_run, flown_test, refuse_copy
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
-from twinloop.campaign.examination.examination import Earlier, Examination
+from twinloop.campaign.examination.examination import Examination, Known
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.examination.loops import loops_around
 from twinloop.campaign.flying import checked_budget, checked_risk, fly
@@ -501,8 +501,20 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self._learn()
         known = self._method.knowledge(self._book)
         twins = known.twins_before()
-        innovations = known.innovations(self._workers)
-        return Examination(self, Earlier(twins, self._error_on, innovations, known.rivals(), self._fared))
+        return Examination(
+            Known(
+                setup=self.setup,
+                experiments=self.experiments,
+                twin=self.twin,
+                history=self.history,
+                best_test=lambda: self.best_test,
+                twins=twins,
+                error=self._error_on,
+                innovations=known.innovations(self._workers),
+                rivals=known.rivals(),
+                fared=self._fared,
+            )
+        )
 
     def checks(self) -> Checks:
         """Whether the twin can be trusted and the controller flown, check by check; printable.

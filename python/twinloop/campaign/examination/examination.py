@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -43,7 +42,8 @@ from twinloop.campaign.examination.use import (
     outside_of,
     strongest_commands,
 )
-from twinloop.campaign.history import Experiment, called
+from twinloop.campaign.history import Experiment, Iteration, Lesson, called
+from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.law.law import Law
 from twinloop.law.linear.friction import has_friction, sliding
@@ -54,15 +54,17 @@ from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory, continued
 
-if TYPE_CHECKING:
-    from twinloop.campaign.campaign import Campaign
-
 
 @dataclass(frozen=True, eq=False)
-class Earlier:
-    """What a campaign's method knows beside its public results.
+class Known:
+    """What a campaign and its method know, by themselves and of earlier twins.
 
     Args:
+        setup: of the campaign.
+        experiments: all of them, at least one.
+        twin: that was learnt last.
+        history: a record for each time that something was learnt.
+        best_test: gives the controller to fly; raises `NotAvailable` where there is none.
         twins: that were known earlier, the oldest first.
         error: of a model on an experiment, over the whole of it.
         innovations: of each experiment that was learnt, as far as it was (n + 1, n_x), whitened; None where there are
@@ -71,6 +73,11 @@ class Earlier:
         fared: how some gains (size,) have fared so far, failures included.
     """
 
+    setup: Setup
+    experiments: tuple[Experiment, ...]
+    twin: Twin
+    history: Sequence[Iteration | Lesson]
+    best_test: Callable[[], Test]
     twins: Sequence[TwinBefore]
     error: Callable[[_core.Model, Experiment], float]
     innovations: Sequence[Floats] | None
@@ -123,23 +130,22 @@ class Examination:
     """The numbers that an engineer checks, each computed on first access.
 
     Args:
-        campaign: with at least one run; it is not changed.
-        earlier: further knowledge of its method.
+        known: of a campaign, which is not changed.
     """
 
-    def __init__(self, campaign: Campaign, earlier: Earlier) -> None:
-        self.campaign = campaign
-        self.setup, self.signals = campaign.setup, campaign.signals
-        self.experiments: tuple[Experiment, ...] = campaign.experiments
+    def __init__(self, known: Known) -> None:
+        self.setup, self.signals = known.setup, known.setup.signals
+        self.experiments = known.experiments
         self.names = called(self.experiments)
-        self.twin: Twin = campaign.twin
-        self.twins_before, self._error, self._fared = earlier.twins, earlier.error, earlier.fared
-        self.innovations = earlier.innovations
-        self.rivals = tuple(earlier.rivals)
+        self.twin = known.twin
+        self.twins_before, self._error, self._fared = known.twins, known.error, known.fared
+        self._history = known.history
+        self.innovations = known.innovations
+        self.rivals = tuple(known.rivals)
         self.best: Test | None = None
         self.no_controller = ""
         try:
-            self.best = campaign.best_test
+            self.best = known.best_test()
         except NotAvailable as reason:
             self.no_controller = str(reason)
 
@@ -160,8 +166,7 @@ class Examination:
     @property
     def learnt(self) -> int:
         """Number of experiments that the twin has learnt; they are the first ones."""
-        history = self.campaign.history
-        return len(history[-1].tests) if history else 0
+        return len(self._history[-1].tests) if self._history else 0
 
     @cached_property
     def unseen(self) -> tuple[Unseen, ...]:
@@ -200,7 +205,7 @@ class Examination:
     def errors(self) -> ErrorMap:
         """Error of each twin on each flight, learnt or not."""
         known = {before.learnt: before.twin.model for before in self.twins_before}
-        return error_map(self.campaign.history, self.experiments, known, self._error)
+        return error_map(self._history, self.experiments, known, self._error)
 
     @property
     def has_friction(self) -> bool:
