@@ -1,4 +1,4 @@
-"""Checks of a log before it is told or learnt: its clock, its gaps, and its columns."""
+"""Checks of a log before it is told or learnt: its clock, and its columns."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
@@ -26,6 +25,7 @@ from twinloop.campaign.data.sent import (
     other_commands,
 )
 from twinloop.campaign.data.wrapped import without_turns
+from twinloop.campaign.examination.clock import Clock
 from twinloop.campaign.examination.told_apart import alike
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, in_file, row_name
@@ -33,13 +33,9 @@ from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 from twinloop.test import Test
-from twinloop.trajectory import JITTER, Trajectory, check_recorded
+from twinloop.trajectory import Trajectory, check_recorded
 from twinloop.unmeasured import completed_readings, lacks
 
-LOST = 1.5
-"""Periods between two rows from which rows were lost."""
-FAR = 1.75
-"""The same where times jitter: more than most rows come late by, less than a lost row takes."""
 MOVED = 3.0
 """Standard deviations of its noise, as guessed from above, that a state must have moved for anything to be learnt."""
 SATURATED = 0.5
@@ -140,11 +136,8 @@ def _checked(
     if lacks(states, signals):
         states = completed_readings(states, signals)
         of_others = {signals.state_names[i] for i in signals.unmeasured}
-    steps = np.diff(t)
-    known = steps[np.isfinite(steps)]
-    lost = _lost(known, signals.dt)
-    near = known[~lost]
-    remarks = [*_of_times(t, known, signals.dt, lines)]
+    clock = Clock(t, signals.dt)
+    remarks = [*clock.remarks(lines)]
     columns = (*_states(states, signals), *_commands(commands, signals))
     for column in columns:
         remarks += _of_envelope(column) if column.name in of_others else _of_column(column, len(t))
@@ -159,10 +152,10 @@ def _checked(
     return LogCheck(
         rows=len(t),
         seconds=float(t[-1] - t[0]) if len(t) else 0.0,
-        period=_period(known, signals.dt) if len(known) else None,
-        jitter=float(np.abs(near / signals.dt - 1.0).max()) if len(near) else None,
-        gaps=int(lost.sum()),
-        longest_gap=float(known[lost].max()) if lost.any() else None,
+        period=clock.period,
+        jitter=clock.jitter,
+        gaps=len(clock.gaps),
+        longest_gap=float(clock.gaps.max()) if len(clock.gaps) else None,
         columns=columns,
         remarks=tuple(remarks),
     )
@@ -201,87 +194,6 @@ def against(
         *ended_early(flight),
         *excitations,
     ]
-
-
-def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) -> Iterator[Remark]:
-    if len(t) < 3:
-        yield serious(
-            "short", f"The log has {len(t)} row{'s' * (len(t) != 1)}: at least 3 are needed to learn from."
-        )
-        return
-    if len(steps) < len(t) - 1:
-        yield serious("times", "Some rows have no time: remove them.")
-        return
-    if (steps <= 0.0).any():
-        yield serious("order", _disorder(t, steps, lines))
-        return
-    period = _period(steps, dt)
-    if _is_other(period, dt):
-        yield serious(
-            "period",
-            f"Rows are {period:.6g} s apart ({1.0 / period:.4g} Hz), {dt:g} s are declared: downsample the log, declare"
-            " its own period as dt, or look whether t is in s.",
-        )
-        return
-    lost = _lost(steps, dt)
-    if lost.any():
-        rows = int(np.rint(steps[lost] / dt - 1.0).sum())
-        first = int(np.argmax(lost))
-        yield serious(
-            "gaps",
-            f"Rows are missing in {int(lost.sum())} place{'s' * (int(lost.sum()) != 1)}, about {rows} in all, the first"
-            f" after {moment(t[first], dt)} s ({row_name(first, lines)}): split the log there, or fill in the rows.",
-        )
-    worst = float(np.abs(steps[~lost] / dt - 1.0).max(initial=0.0))
-    if worst > JITTER:
-        yield serious(
-            "jitter",
-            f"The time between two rows departs by up to {two_digits(100.0 * worst)} % from dt; {100.0 * JITTER:g} %"
-            " are allowed. Where the loop only jitters around its period, twinloop check --even brings times onto it.",
-        )
-
-
-def _period(steps: Floats, dt: float) -> float:
-    """The time from one row to the next, without lost rows.
-
-    The median is that of the rows that come late, or early, where those alternate: then the mean tells.
-    """
-    return float(steps[steps <= FAR * dt].mean() if _jitters(steps, dt) else np.median(steps))
-
-
-def _jitters(steps: Floats, dt: float) -> bool:
-    """Whether most rows come late or early, around the declared period."""
-    near = steps[steps <= FAR * dt]
-    uneven = len(near) > 0 and float(np.median(np.abs(steps / dt - 1.0))) > JITTER
-    return uneven and not _is_other(float(near.mean()), dt)
-
-
-def _is_other(period: float, dt: float) -> bool:
-    return abs(period / dt - 1.0) > JITTER
-
-
-def _lost(steps: Floats, dt: float) -> NDArray[np.bool_]:
-    """Between which rows others were lost."""
-    return steps > (FAR if _jitters(steps, dt) else LOST) * dt
-
-
-def _disorder(t: Floats, steps: Floats, lines: Sequence[int] | None) -> str:
-    """How time does not increase, in words."""
-    back = steps < 0.0
-    if back.all():
-        return "The rows are in reverse order, the last time first: sort them by t."
-    row = int(np.argmax(back if back.any() else steps == 0.0)) + 1
-    before, after = (moment(each, float(t[row - 1] - t[row])) for each in (t[row - 1], t[row]))
-    if back.any():
-        return (
-            f"Time goes back at {row_name(row, lines)}, from {before} s to {after} s: sort the rows by t, or"
-            " split the log where another one begins."
-        )
-    count = int((steps == 0.0).sum())
-    return (
-        f"{count} row{' has' if count == 1 else 's have'} the time of the row before, the first at"
-        f" {row_name(row, lines)}, {after} s: remove rows that are repeated, or write t with more digits."
-    )
 
 
 def _finite(values: Floats) -> tuple[Floats, int]:
