@@ -152,7 +152,7 @@ def unfit(book: Logbook) -> list[Floats]:
     Args:
         book: of the campaign.
     """
-    flown = [number for number in sorted(book.flown) if _told(book, number)]
+    flown = [number for number in sorted(book.flown) if _has_result(book, number)]
     asked = [book.tests[number].genes for number in flown if not finishes(book, number)]
     others = [
         run.replayed.genes
@@ -174,7 +174,7 @@ def borne(book: Logbook) -> int:
     """
     count, signals = 0, book.setup.signals
     for test in reversed(book.tests):
-        if test.hold_back is None or not _told(book, test.number):
+        if test.hold_back is None or not _has_result(book, test.number):
             continue
         runs = _runs(book, test.number)
         excited = any(run.test is not None and run.test.excitation is not None for run in runs)
@@ -307,7 +307,7 @@ def _asked_after(book: Logbook, turn: Turn) -> tuple[Any, ...]:
     )
 
 
-def _told(book: Logbook, test: int) -> bool:
+def _has_result(book: Logbook, test: int) -> bool:
     """Whether anything was told of the gains of a test."""
     return bool(_runs(book, test)) or failed(book, test)
 

@@ -179,7 +179,7 @@ def tell(
     as_json: bool,
 ) -> None:
     """Record the result of a TEST: a FLIGHT as CSV or .npz, complete or aborted, or why there is none."""
-    log = _told(store, name, test, flight, failed, aborted, reason)
+    log = _log_of(store, name, test, flight, failed, aborted, reason)
     with closing(opened_by_hand(store, name)) as campaign:
         if failed is not None:
             asked, read = tell_failed(campaign, test, failed, log, fields_beside(store))
@@ -208,7 +208,7 @@ def tell(
         _say(campaign, remarks, test)
 
 
-def _told(
+def _log_of(
     store: str,
     name: str | None,
     test: int,

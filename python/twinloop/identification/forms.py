@@ -61,8 +61,8 @@ def first_form(options: IdentificationOptions, signals: Signals) -> str:
         options: of the identification.
         signals: of the system.
     """
-    told = options.form != "auto" or options.fixed_terms or options.bounded_terms
-    return options.form_for(signals) if told else "acceleration"
+    declared = options.form != "auto" or options.fixed_terms or options.bounded_terms
+    return options.form_for(signals) if declared else "acceleration"
 
 
 def candidates(

@@ -102,7 +102,7 @@ def test_a_law_lasts_under_as_many_of_the_drawn_controllers_as_it_does_one_by_on
 
 
 @pytest.mark.parametrize(
-    ("explained", "damping", "missed", "doubted"),
+    ("explained", "damping", "missed", "invalid"),
     [
         (False, 1.0, [], True),
         (True, 1.0, ["rate"], False),
@@ -111,12 +111,12 @@ def test_a_law_lasts_under_as_many_of_the_drawn_controllers_as_it_does_one_by_on
         (True, -9.0, [], False),
     ],
 )
-def test_a_law_is_doubted_where_a_model_error_may_be_what_explains_it_and_it_is_wild(
-    explained, damping, missed, doubted
+def test_a_law_is_invalid_where_a_model_error_may_be_what_explains_it_and_it_is_wild(
+    explained, damping, missed, invalid
 ):
     asked = setup()
     learner = Learner(asked, asked.options, WORKERS, unwatched)
     answer = SimpleNamespace(
         explained=explained, believed=[law(damping)], misses=lambda flights, setup, workers: missed
     )
-    assert learner._doubted(answer, SimpleNamespace(flights=[None, None])) is doubted
+    assert learner._invalidated(answer, SimpleNamespace(flights=[None, None])) is invalid

@@ -72,7 +72,7 @@ class Two:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class EstimationData:
     """What is learnt from, and held against what is learnt.
 
     Args:
@@ -121,7 +121,7 @@ class Learner:
         """
         experiments = len(book.experiments)
         needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
-        told = self._told(book.experiments)
+        data = self._data_of(book.experiments)
         earlier = None if asked is None else asked.identified
         begun = under_way
 
@@ -130,38 +130,38 @@ class Learner:
             begun = so_far
             keep(so_far)
 
-        answer = told.answered(
-            told.identify(
+        answer = data.answered(
+            data.identify(
                 self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=kept
             )
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
-            answer = or_known_before(answer, earlier, told.answered)
-        doubted, learnt_of = self._doubted(answer, told), book.experiments
-        if doubted and self.options.inside:
+            answer = or_known_before(answer, earlier, data.answered)
+        invalid, learnt_of = self._invalidated(answer, data), book.experiments
+        if invalid and self.options.inside:
             found = self._inside(book.experiments, earlier)
             if found is not None:
-                (told, answer, begun), learnt_of = found, inside(book.experiments)
-                doubted = self._doubted(answer, told)
+                (data, answer, begun), learnt_of = found, inside(book.experiments)
+                invalid = self._invalidated(answer, data)
         if earlier is not None:
-            again = cache(partial(self._known_again, told, earlier, begun))
+            again = cache(partial(self._known_again, data, earlier, begun))
             if not answer.explained and self.options.earlier_twin:
                 answer = or_known_again(answer, again())
-                doubted = self._doubted(answer, told)
-            tamer = self._tamer(answer, doubted, earlier, again, told) if self.options.tame else None
+                invalid = self._invalidated(answer, data)
+            tamer = self._tamer(answer, invalid, earlier, again, data) if self.options.tame else None
             if tamer is not None:
-                answer, doubted = tamer, self._doubted(tamer, told)
+                answer, invalid = tamer, self._invalidated(tamer, data)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
-        if self.options.plain != self.options and doubted:
-            rough = with_remark(told.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
-            answer, two = self._of_two(answer, told.answered(rough, number=2), two, told)
+        if self.options.plain != self.options and invalid:
+            rough = with_remark(data.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
+            answer, two = self._of_two(answer, data.answered(rough, number=2), two, data)
         if asked is not None and self.options.earlier_twin and not answer.explained:
-            answer = or_foretold(answer, asked.identified, asked.experiments, told.answered)
+            answer = or_foretold(answer, asked.identified, asked.experiments, data.answered)
         odd = self._contradicting(answer, learnt_of)
         identified = answer.identified
         model = None if earlier is None else earlier.model
         lesson = lesson_of(
-            answer, is_rough(identified), book, told.flights, told.selected, model, odd, self.workers
+            answer, is_rough(identified), book, data.flights, data.selected, model, odd, self.workers
         )
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -176,7 +176,7 @@ class Learner:
             models=(*models, identified.model),
             two_laws=two.laws,
             rough=two.rough,
-            explained=not doubted,
+            explained=not invalid,
         )
         return replace(
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
@@ -187,15 +187,15 @@ class Learner:
         odd = odd_log(experiments, self.setup.signals) if answer.explained else None
         if odd is None:
             return None
-        told = self._told(righted(experiments, odd))
-        of_righted = told.identify(self.options, iteration=RIGHTED + len(experiments))
+        data = self._data_of(righted(experiments, odd))
+        of_righted = data.identify(self.options, iteration=RIGHTED + len(experiments))
         return odd if is_made_for(answer.identified, odd, of_righted) else None
 
-    def _told(self, experiments: Sequence[Experiment]) -> Told:
+    def _data_of(self, experiments: Sequence[Experiment]) -> EstimationData:
         """What is learnt from experiments, and what answers are held against."""
         selected = learnt_from(experiments, self.options.most_readings, self.setup.signals)
         flights = without_wrong_readings(experiments, self.setup.signals)
-        return Told(
+        return EstimationData(
             flights,
             selected,
             self._identification(selected, self._drawn(experiments, 3)),
@@ -204,7 +204,7 @@ class Learner:
 
     def _inside(
         self, experiments: Sequence[Experiment], earlier: Identified | None
-    ) -> tuple[Told, Answer, UnderWay | None] | None:
+    ) -> tuple[EstimationData, Answer, UnderWay | None] | None:
         """What is told, learnt and searched of flights as far as they were inside their envelope.
 
         None where none has left it for good, or where so little is left of them that more is lost than won.
@@ -212,16 +212,16 @@ class Learner:
         kept = inside(experiments)
         if all(part is run for part, run in zip(kept, experiments, strict=True)):
             return None
-        told, begun = self._told(kept), list[UnderWay]()
-        found = told.identify(
+        data, begun = self._data_of(kept), list[UnderWay]()
+        found = data.identify(
             self.options, iteration=INSIDE_ONLY + len(experiments), earlier=earlier, keep=begun.append
         )
-        answer = told.answered(found, number=5)
+        answer = data.answered(found, number=5)
         if not (answer.explained or enough_inside(experiments, kept)):
             return None
-        return told, answer, begun[-1] if begun else None
+        return data, answer, begun[-1] if begun else None
 
-    def _doubted(self, answer: Answer, told: Told) -> bool:
+    def _invalidated(self, answer: Answer, data: EstimationData) -> bool:
         """Whether a law does not explain the flights; or only what may be a model error explains them, and it is wild.
 
         Whatever may disturb explains much. A law that needs it, and diverges under most controllers of the box, such as
@@ -229,40 +229,40 @@ class Learner:
         """
         if not answer.explained:
             return True
-        everywhere = self._drawn(told.flights, 0)
+        everywhere = self._drawn(data.flights, 0)
         (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
-        return 2 * lasting < DRAWN and bool(answer.misses(told.flights, self.setup, self.workers))
+        return 2 * lasting < DRAWN and bool(answer.misses(data.flights, self.setup, self.workers))
 
-    def _known_again(self, told: Told, known: Identified, begun: UnderWay | None) -> Answer:
+    def _known_again(self, data: EstimationData, known: Identified, begun: UnderWay | None) -> Answer:
         """The law known before, tuned on all flights: wrong and late readings, and the form, are of the search anew."""
         first_step = None if begun is None else replace(begun, searches=())
-        iteration = AGAIN + len(told.flights)
-        identified = told.identify(
+        iteration = AGAIN + len(data.flights)
+        identified = data.identify(
             self.options.as_known, iteration=iteration, earlier=known, under_way=first_step
         )
-        return told.answered(identified, number=4)
+        return data.answered(identified, number=4)
 
     def _tamer(
         self,
         answer: Answer,
-        doubted: bool,
+        invalid: bool,
         known: Identified,
         known_again: Callable[[], Answer],
-        told: Told,
+        data: EstimationData,
     ) -> Answer | None:
         """The law known before, tuned on all flights, where it is tamer than that of an answer and follows nearly."""
-        everywhere = self._drawn(told.flights, 2)
+        everywhere = self._drawn(data.flights, 2)
 
         def lasting(other: Identified) -> Lasting:
             models = [answer.identified.model, other.model]
             return Lasting(*lasting_under(models, self.setup, everywhere, self.workers))
 
-        if not is_wilder(answer.identified, known, lasting(known), doubted):
+        if not is_wilder(answer.identified, known, lasting(known), invalid):
             return None
         again = known_again()
         tame = replace(again, identified=with_remark(again.identified, TAME))
         both = lasting(again.identified)
-        wilder = is_wilder(answer.identified, again.identified, both, doubted)
+        wilder = is_wilder(answer.identified, again.identified, both, invalid)
         return tame.with_doubtful_disturbances() if wilder and follows_nearly(tame, answer, both) else None
 
     def _drawn(self, flights: Sequence[Experiment], number: int) -> Floats:
@@ -274,16 +274,16 @@ class Learner:
         answer: Answer,
         rough: Answer,
         before: Two,
-        told: Told,
+        data: EstimationData,
     ) -> tuple[Answer, Two]:
         """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds."""
         if self.options.earlier_twin and before.rough is not None:
-            rough = or_lasted_before(rough, before.rough, told.answered)
-        both = TwoLaws(len(told.flights), answer.identified.model, rough.identified.model)
+            rough = or_lasted_before(rough, before.rough, data.answered)
+        both = TwoLaws(len(data.flights), answer.identified.model, rough.identified.model)
         now = Two((*before.laws, both), rough.identified)
-        foretold = better_foretold(now.laws, told.flights, self.setup.limits, self.workers)
+        foretold = better_foretold(now.laws, data.flights, self.setup.limits, self.workers)
         laws = [both.nonlinear, both.linear]
-        lasting = lasting_under(laws, self.setup, self._drawn(told.flights, 1), self.workers)
+        lasting = lasting_under(laws, self.setup, self._drawn(data.flights, 1), self.workers)
         return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
 
     def _identification(self, selected: Sequence[Selected], everywhere: Floats) -> partial[Identified]:

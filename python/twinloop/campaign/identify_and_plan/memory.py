@@ -103,8 +103,8 @@ class Learnt(Recorded, kind="learnt"):
         Args:
             experiments: as they were told.
         """
-        told = experiments[: self.experiments]
-        return inside(told) if self.inside else told
+        first = experiments[: self.experiments]
+        return inside(first) if self.inside else first
 
     @property
     def misses(self) -> bool:

@@ -91,8 +91,8 @@ def misses_of(
     off, frozen = of_each_state(model, lengths, flights, limits, workers)
     steered = np.array([[run.test is not None] for run in flights])
 
-    def beyond(part: int, told: Noise, *causes_out: Cause) -> Floats:
-        known = told.without(_caused(causes, *causes_out))
+    def beyond(part: int, estimated: Noise, *causes_out: Cause) -> Floats:
+        known = estimated.without(_caused(causes, *causes_out))
         expected = expected_misses(model, lengths, flights, known, unit.part(part), limits, workers)
         return unexplained(off, frozen, expected, steered)
 

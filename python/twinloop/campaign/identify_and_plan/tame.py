@@ -42,16 +42,16 @@ class Lasting(NamedTuple):
         return 2 * self.known > DRAWN and 2 * self.law < self.known
 
 
-def is_wilder(law: Identified, known: Identified, lasting: Lasting, doubted: bool) -> bool:
+def is_wilder(law: Identified, known: Identified, lasting: Lasting, invalid: bool) -> bool:
     """Whether the known law may be the better one: where the new one is wild, or has more terms and lasts less often.
 
     Args:
         law: the new one.
         known: the law known before.
         lasting: of both.
-        doubted: whether the new one is compared with a linear one anyway, unless it is wild.
+        invalid: whether the new one is compared with a linear one anyway, unless it is wild.
     """
-    grown = not doubted and law.terms > known.terms
+    grown = not invalid and law.terms > known.terms
     return lasting.wild or (grown and lasting.law < lasting.known)
 
 

@@ -80,14 +80,17 @@ def gaps(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
                     break
             if not several:
                 continue
-            told = max(several, key=by_evidence)
-            if told.evidence.length < hypothesis.evidence.length + FAR:
-                told = _polished(context, told, hypothesis)
-            if told.evidence > hypothesis.evidence and (more := _with_more(context, told, place)) is not told:
-                told = _polished(context, more, hypothesis)
-            yield told
-            if told.evidence > hypothesis.evidence:
-                yield from (fitted(context, closed) for closed in _closed(context, told, place))
+            with_mass = max(several, key=by_evidence)
+            if with_mass.evidence.length < hypothesis.evidence.length + FAR:
+                with_mass = _polished(context, with_mass, hypothesis)
+            if (
+                with_mass.evidence > hypothesis.evidence
+                and (more := _with_more(context, with_mass, place)) is not with_mass
+            ):
+                with_mass = _polished(context, more, hypothesis)
+            yield with_mass
+            if with_mass.evidence > hypothesis.evidence:
+                yield from (fitted(context, closed) for closed in _closed(context, with_mass, place))
                 return
 
 
@@ -101,29 +104,31 @@ def _short(hypothesis: Hypothesis) -> Hypothesis:
     return hypothesis if left >= 0 else replace(hypothesis, runs=tuple(runs))
 
 
-def _polished(context: Context, told: Hypothesis, known: Hypothesis) -> Hypothesis:
+def _polished(context: Context, with_mass: Hypothesis, known: Hypothesis) -> Hypothesis:
     """The best hypothesis tuned to from beside one: where a mass just touches, what is left has many valleys.
 
     One that is no likelier than what is known without a mass is hardly another valley's neighbour: it gets one chance.
     """
     failed, dt = 0, context.signals.dt
     for number in range(ROUNDS):
-        if all(one.chain.motion.white * dt <= QUIET * float(one.chain.sensors[0]) for one in told.sums):
+        if all(one.chain.motion.white * dt <= QUIET * float(one.chain.sensors[0]) for one in with_mass.sums):
             break
-        begun = replace(settled(told), fit=None)
+        begun = replace(settled(with_mass), fit=None)
         # Half of the corners of a box, then the others.
         corners = [
             corner for corner in itertools.product((False, True), repeat=4) if sum(corner) % 2 == number % 2
         ]
-        best = max([told, *(fitted(context, _beside(begun, corner)) for corner in corners)], key=by_evidence)
-        failed = 0 if best.evidence.less(GAIN) > told.evidence else failed + 1
-        told = best
-        if failed == (2 if told.evidence > known.evidence else 1):
+        best = max(
+            [with_mass, *(fitted(context, _beside(begun, corner)) for corner in corners)], key=by_evidence
+        )
+        failed = 0 if best.evidence.less(GAIN) > with_mass.evidence else failed + 1
+        with_mass = best
+        if failed == (2 if with_mass.evidence > known.evidence else 1):
             break
-    return told
+    return with_mass
 
 
-def _beside(told: Hypothesis, corner: Sequence[bool]) -> Hypothesis:
+def _beside(with_mass: Hypothesis, corner: Sequence[bool]) -> Hypothesis:
     """The hypothesis with another mass, numbers of which are larger, the others smaller, that is pressed as much."""
     changed = {
         name: 1.0 + share if larger else 1.0 / (1.0 + share)
@@ -131,9 +136,9 @@ def _beside(told: Hypothesis, corner: Sequence[bool]) -> Hypothesis:
     }
     hidden = tuple(
         one._replace(**{name: getattr(one, name) * factor for name, factor in changed.items()})
-        for one in told.actuation.hidden
+        for one in with_mass.actuation.hidden
     )
-    stiffer, pool = 1.0 / (changed["turns"] * changed["turns"]), told.pool
+    stiffer, pool = 1.0 / (changed["turns"] * changed["turns"]), with_mass.pool
     sums = tuple(
         replace(
             found,
@@ -143,18 +148,18 @@ def _beside(told: Hypothesis, corner: Sequence[bool]) -> Hypothesis:
             },
             others=[],
         )
-        for found in told.sums
+        for found in with_mass.sums
     )
-    return replace(told, actuation=replace(told.actuation, hidden=hidden), sums=sums)
+    return replace(with_mass, actuation=replace(with_mass.actuation, hidden=hidden), sums=sums)
 
 
-def _with_more(context: Context, told: Hypothesis, place: int) -> Hypothesis:
+def _with_more(context: Context, with_mass: Hypothesis, place: int) -> Hypothesis:
     """The hypothesis with terms that pay beside what presses on its mass: each is added to what is tuned.
 
     Regressions on readings find none: of what presses they know too little between them.
     """
     for _ in range(MORE):
-        grown = replace(told, candidates=told.candidates.growing())
+        grown = replace(with_mass, candidates=with_mass.candidates.growing())
         problem, known = Problem(context, grown), grown.sums[place]
         every = list(frictions(context.signals, problem.stages.start)) if context.options.friction else []
         readings = problem.readings(known.chain)
@@ -169,16 +174,16 @@ def _with_more(context: Context, told: Hypothesis, place: int) -> Hypothesis:
         for node in (nodes[i] for i in best if gains[i] > costs[i]):
             more = replace(begun, candidates=begun.candidates.with_terms([node]))
             others.append(_with_sum(more, place, replace(own, weights={**own.weights, node: 0.0}, others=[])))
-        found = max([told, *(fitted(context, other) for other in others)], key=by_evidence)
-        if found is told:
+        found = max([with_mass, *(fitted(context, other) for other in others)], key=by_evidence)
+        if found is with_mass:
             break
-        told = found
-    return told
+        with_mass = found
+    return with_mass
 
 
-def _closed(context: Context, told: Hypothesis, place: int) -> Iterator[Hypothesis]:
+def _closed(context: Context, with_mass: Hypothesis, place: int) -> Iterator[Hypothesis]:
     """The hypothesis with a spring in the place of a gap, as two hidden states that turn; none where they would not."""
-    begun = settled(replace(told, candidates=told.candidates.growing()))
+    begun = settled(replace(with_mass, candidates=with_mass.candidates.growing()))
     own, known, pool = begun.actuation.hidden[0], begun.sums[place], begun.pool
     stiffness = 1.0 / (own.turns * own.turns)
     half = 0.5 * (own.damping * stiffness + 1.0 / own.time)

@@ -72,12 +72,12 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     # Behind a short memory of noisy readings their noise would explain itself.
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
     better, numbers = False, _Numbers(itertools.count(), itertools.count(bare.searches, SEARCHES))
-    for told in _told(context, bare, numbers):
-        better |= told.evidence > hypothesis.evidence
-        yield told
+    for stored in _with_storage(context, bare, numbers):
+        better |= stored.evidence > hypothesis.evidence
+        yield stored
     if not better:
         for variant in _undisturbed(context, bare):
-            yield from _told(context, variant, numbers, brief=True)
+            yield from _with_storage(context, variant, numbers, brief=True)
 
 
 class _Numbers(NamedTuple):
@@ -92,7 +92,9 @@ class _Numbers(NamedTuple):
     searches: Iterator[int]
 
 
-def _told(context: Context, bare: Hypothesis, numbers: _Numbers, brief: bool = False) -> Iterator[Hypothesis]:
+def _with_storage(
+    context: Context, bare: Hypothesis, numbers: _Numbers, brief: bool = False
+) -> Iterator[Hypothesis]:
     """A hypothesis with the best hidden states that motion fills, beside its lags and in their place, fitted.
 
     Args:
@@ -110,25 +112,25 @@ def _told(context: Context, bare: Hypothesis, numbers: _Numbers, brief: bool = F
             if screen is not screens[0] and not found.evidence > screens[0].plain.evidence:
                 continue
             found = replace(found, searches=next(numbers.searches))
-            told = fitted(context, from_both_sides(context, found, found.sums))
+            stored = fitted(context, from_both_sides(context, found, found.sums))
             # What readings cannot show is no law, but has drawn what nothing else may.
-            shown = shows(told.actuation.hidden, context.signals.dt) and not _stands_in(context, told)
-            if told.fit is not None and not shown:
-                told = replace(told, fit=replace(told.fit, chi_squared=math.inf))
-            yield told
+            shown = shows(stored.actuation.hidden, context.signals.dt) and not _stands_in(context, stored)
+            if stored.fit is not None and not shown:
+                stored = replace(stored, fit=replace(stored.fit, chi_squared=math.inf))
+            yield stored
 
 
-def _stands_in(context: Context, told: Hypothesis) -> bool:
+def _stands_in(context: Context, stored: Hypothesis) -> bool:
     """Whether a pair that commands drive hardly swings and leaves more than noise: it stands in for what states do.
 
     A law that states feed back answers to commands for as long as a servo does, but under other gains it answers
     otherwise. What is left tells the two apart: behind a servo everything is explained. What swings
     shows itself.
     """
-    if not any(one.commands and one.time < one.turns for one in told.actuation.hidden):
+    if not any(one.commands and one.time < one.turns for one in stored.actuation.hidden):
         return False
-    problem = Problem(context, told)
-    return any(disturbed(problem, found.chain, LEFT) for found in told.sums)
+    problem = Problem(context, stored)
+    return any(disturbed(problem, found.chain, LEFT) for found in stored.sums)
 
 
 def shows(hidden: Sequence[HiddenState], period: float) -> bool:
