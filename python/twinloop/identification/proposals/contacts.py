@@ -11,9 +11,9 @@ from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.lags import without_lags
 from twinloop.identification.search.drives import drive
-from twinloop.identification.search.noise import first_noise, still
+from twinloop.identification.search.noise import still
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.search.selection import from_both_sides, short_search
 from twinloop.identification.search.structure import search
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, begun, damped, entered, hinges, limits
@@ -85,11 +85,7 @@ def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) 
     grown = hypothesis.candidates.growing()
     places = {entered(grown.pool, hinge, len(every)): hinge for hinge in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places), fit=None)
-    walks = context.walks(tried.next_unit(context.unit), context.options.moves // 4)
-    chains = [found.chain for found in tried.sums]
-    problem, terms = Problem(context, tried), tried.candidates.ladder[0]
-    below = first_noise(problem, chains, terms, context.options.gusts)
-    sums = search(problem, below, terms, tried.sums, walks)
+    sums = short_search(context, tried, [found.chain for found in tried.sums], tried.sums)
     near = (subset for found in sums for subset, above in found.subsets if above < NEAR)
     return [
         places[term] for term in dict.fromkeys(term for subset in near for term in subset) if term in places

@@ -10,10 +10,8 @@ from dataclasses import replace
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.noise import first_noise
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import from_both_sides
-from twinloop.identification.search.structure import search
+from twinloop.identification.search.selection import from_both_sides, short_search
 from twinloop.identification.starts import GROWTH
 from twinloop.identification.terms.exponentials import FINER, Exponential, entered, finer
 from twinloop.identification.terms.exponentials import exponentials as all_exponentials
@@ -65,11 +63,7 @@ def _showing(
     grown = hypothesis.candidates.growing()
     places = {entered(grown.pool, one, len(every)): one for one in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places))
-    walks = context.walks(tried.next_unit(context.unit), context.options.moves // 4)
-    nothing = [None] * len(tried.driven)
-    problem, terms = Problem(context, tried), tried.candidates.ladder[0]
-    below = first_noise(problem, tried.driven, terms, context.options.gusts)
-    sums = search(problem, below, terms, nothing, walks)
+    sums = short_search(context, tried, tried.driven, [None] * len(tried.driven))
     showing = (
         next(filter(None, ([t for t in each.terms if t in places] for each in found.subsets)), [])
         for found in sums

@@ -20,6 +20,7 @@ from twinloop.identification.search.noise import calm, first_noise, unexplained
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.sensors.chains import Chain
 
 
 def from_both_sides(
@@ -52,6 +53,23 @@ def from_both_sides(
         sums=tuple(shortest(pair, lambda found: found.description_length) for pair in both),
         from_above=high.sums,
     )
+
+
+def short_search(
+    context: Context, hypothesis: Hypothesis, chains: Sequence[Chain], known: Sequence[Sum | None]
+) -> list[Sum]:
+    """Sums of a quarter of the usual moves among the terms of the first rung, with the noise that all of them leave.
+
+    Args:
+        context: of the identification.
+        hypothesis: whose terms are searched.
+        chains: that they drive.
+        known: sums to begin with, one for each chain; None: of no terms.
+    """
+    walks = context.walks(hypothesis.next_unit(context.unit), context.options.moves // 4)
+    problem, terms = Problem(context, hypothesis), hypothesis.candidates.ladder[0]
+    below = first_noise(problem, chains, terms, context.options.gusts)
+    return list(search(problem, below, terms, known, walks))
 
 
 def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hypothesis:
