@@ -17,7 +17,8 @@ from twinloop.law.accuracy import squares
 from twinloop.law.beginning import start_of
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
-from twinloop.law.pieces import in_pieces, judged_length
+from twinloop.law.pieces import held, in_pieces, judged_length
+from twinloop.signals import Signals
 from twinloop.test import Test
 
 
@@ -121,6 +122,35 @@ def missed_by(
     """
     runs = drawn_runs(model, flown, limits, workers=workers)
     return squares(np.asarray(runs.read[0])[1:], read, limits.signals), int(runs.lasted[0])
+
+
+def missed_of(
+    model: _core.Model, flight: Experiment, length: int, limits: Limits, workers: _core.Workers
+) -> tuple[Floats, bool]:
+    """Squares of what a free run misses of a flight (n, n_x), as by `missed_by`, and whether it lasts as long.
+
+    Args:
+        model: that is flown.
+        flight: that was made.
+        length: steps of the pieces in which it is followed.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    flown = as_flown(model, flight, length, limits, workers)
+    missed, lasted = missed_by(model, flown, flight.trajectory.states[1:], limits, workers)
+    return missed, lasted == flight.trajectory.steps
+
+
+def frozen_of(flight: Experiment, length: int, signals: Signals) -> Floats:
+    """The same of a model that never moves from where each piece of a flight begins (n, n_x).
+
+    Args:
+        flight: that was made.
+        length: steps of the pieces.
+        signals: of the system.
+    """
+    states = flight.trajectory.states
+    return squares(states[1:], held(states, length), signals)
 
 
 def cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:

@@ -17,13 +17,13 @@ from twinloop._experiment.replay import Replay
 from twinloop.campaign.entering import with_run
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.logbook import Logbook
-from twinloop.campaign.replaying import as_flown, length_of, missed_by
+from twinloop.campaign.replaying import frozen_of, length_of, missed_of
 from twinloop.campaign.setup import Setup
 from twinloop.law.accuracy import TestErrors, squares
 from twinloop.law.beginning import states_read
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
-from twinloop.law.pieces import held, in_pieces
+from twinloop.law.pieces import in_pieces
 from twinloop.objectives import closed_loop, normalised_error, open_loop
 
 
@@ -119,12 +119,9 @@ def _free_error(
     model: _core.Model, run: Experiment, length: int, limits: Limits, workers: _core.Workers
 ) -> FreeError:
     """Of a free run in pieces of a length, in units of the states' scales."""
-    read, steps = run.trajectory.states, run.trajectory.steps
-    missed, lasted = missed_by(
-        model, as_flown(model, run, length, limits, workers), read[1:], limits, workers
-    )
-    still = squares(read[1:], held(read, length), limits.signals)
-    return FreeError(float(missed.mean()) if lasted == steps else np.inf, float(still.mean()), length)
+    missed, lasted = missed_of(model, run, length, limits, workers)
+    still = frozen_of(run, length, limits.signals)
+    return FreeError(float(missed.mean()) if lasted else np.inf, float(still.mean()), length)
 
 
 def _one_step_errors(model: _core.Model, book: Logbook, workers: _core.Workers) -> Sequence[float]:

@@ -12,11 +12,10 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.replaying import as_flown, lengths_of, missed_by
+from twinloop.campaign.replaying import as_flown, frozen_of, lengths_of, missed_by
 from twinloop.law.accuracy import squares
 from twinloop.law.beginning import states_read
 from twinloop.law.noise import Noise
-from twinloop.law.pieces import held
 
 FEWEST = 4
 """Members of a committee that are kept in any case."""
@@ -99,7 +98,7 @@ def following(
     lengths = lengths_of(models[0], flights, limits, workers, noise)
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
-        frozen[j] = squares(states[1:], held(states, lengths[j]), limits.signals).mean()
+        frozen[j] = frozen_of(flight, lengths[j], limits.signals).mean()
         for i, model in enumerate(models):
             flown = as_flown(model, flight, lengths[j], limits, workers)
             missed, length = missed_by(model, flown, states[1:], limits, workers)

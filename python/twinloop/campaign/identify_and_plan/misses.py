@@ -17,11 +17,10 @@ from twinloop._ground.streams import Unit
 from twinloop.campaign.data.sent import in_pulses
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.following import Following
-from twinloop.campaign.replaying import as_flown, lengths_of, missed_by
+from twinloop.campaign.replaying import as_flown, frozen_of, lengths_of, missed_of
 from twinloop.law.accuracy import squares
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
-from twinloop.law.pieces import held
 from twinloop.law.reports import reports_of
 from twinloop.test import Test
 
@@ -249,9 +248,7 @@ def of_each_state(
     """
     off, frozen = np.empty((2, len(flights), limits.signals.n_x))
     for j, flight in enumerate(flights):
-        states, steps = flight.trajectory.states, flight.trajectory.steps
-        flown = as_flown(model, flight, lengths[j], limits, workers)
-        missed, lasted = missed_by(model, flown, states[1:], limits, workers)
-        off[j] = missed.mean(axis=0) if lasted == steps else np.inf
-        frozen[j] = squares(states[1:], held(states, lengths[j]), limits.signals).mean(axis=0)
+        missed, lasted = missed_of(model, flight, lengths[j], limits, workers)
+        off[j] = missed.mean(axis=0) if lasted else np.inf
+        frozen[j] = frozen_of(flight, lengths[j], limits.signals).mean(axis=0)
     return off, frozen
