@@ -818,6 +818,8 @@ def test_a_log_whose_columns_have_other_names_is_told_attached_checked_and_withd
     assert run("attach", "rig.db", "flight.csv").exit_code == 0 and look().experiments[0].attached
     assert run("withdraw", "rig.db", "flight.csv", "--reason", "a test").exit_code == 0
     assert not look().experiments
+    said = run("ask", "rig.db").stdout
+    assert "Record t ('Time (s)'), angle ('IMU pitch'), rate ('wy'), torque ('Out 1'), then:" in said
     # One with the signals' own names needs no others.
     assert run("tell", "rig.db", "0", "own.csv").exit_code == 0
 

@@ -151,6 +151,7 @@ def _shown(campaign: Campaign, test: Test, advice: str) -> tuple[str, dict[str, 
         advice,
         flown,
         chosen,
+        fields_beside(place.store),
     )
     return text, facts(test, file, flown, predicted, against_twin, advice, chosen)
 

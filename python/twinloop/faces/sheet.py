@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
 from twinloop.faces.ends import ends, varying, varying_words
 from twinloop.faces.text import quality_words, table
+from twinloop.logs import TIME
 from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
 from twinloop.remarks import Remark
@@ -268,6 +270,7 @@ def sheet(
     advice: str = "",
     flown: bool = False,
     chosen: bool = False,
+    called: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """The test sheet, to be printed.
 
@@ -282,6 +285,7 @@ def sheet(
         advice: to stop instead; empty where there is none.
         flown: whether any test was flown yet, recorded or failed; attached flights are of none.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
+        called: what columns of logs are called, by signal, where they have other names.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
@@ -316,6 +320,10 @@ def sheet(
     lines += [reason(test, predicted is not None, chosen), *_alike(test, waiting)]
     lines += [f"{one}." for one in in_words(signals)]
     read = [signals.state_names[i] for i in signals.measured]
-    lines.append(f"Record t, {', '.join((*read, *signals.command_names))}, then:")
+    columns = [
+        f"{name} ({called[name].strip()!r})" if name in called else name
+        for name in (TIME, *read, *signals.command_names)
+    ]
+    lines.append(f"Record {', '.join(columns)}, then:")
     lines.append(f"  {stored_as.to_type('tell', test.number, 'FLIGHT.csv')}")
     return "\n".join(lines) + "\n"

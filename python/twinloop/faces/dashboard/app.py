@@ -27,7 +27,7 @@ from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.dashboard.desk import Desk, unlearnt
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.ends import ends, varying_words
-from twinloop.faces.opening import changed_since
+from twinloop.faces.opening import changed_since, fields_beside
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import (
@@ -274,8 +274,9 @@ class Pages:
         waiting, stored_as = to_be_flown(campaign), self.desk.stored_as(name)
         file = columns_file(stored_as, test).name
         advice, flown, chosen = advised_to_stop(campaign), campaign.runs > 0, is_chosen(campaign, test)
+        called = fields_beside(self.desk.store)
         return sheet(
-            stored_as, test, predicted, file, campaign.setup, against, waiting, advice, flown, chosen
+            stored_as, test, predicted, file, campaign.setup, against, waiting, advice, flown, chosen, called
         )
 
     def _columns(self, name: str, number: int) -> tuple[str, str]:
