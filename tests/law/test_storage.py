@@ -358,6 +358,18 @@ def test_an_export_has_it_as_states(which, kind, tmp_path):
         assert np.abs(states[1:, twin.signals.n_x :]).min(axis=0).max() > 0.0
 
 
+def test_an_export_says_how_they_begin():
+    for kind, mark in (("python", "# "), ("c", "   ")):
+        files = stored_twin().export(kind)
+        assert f"{mark}hidden_2 begins " in files
+    text = stored_twin().export("python")
+    state = np.array([0.4, -0.3])
+    start = begun(stored_twin().law, state)
+    for name, value in zip(stored_twin().law.held_symbols[-(len(start) - 2) :], start[2:], strict=True):
+        words = "where it stands still under the first state" if value != 0.0 else "with 0"
+        assert f"# {name} begins {words}." in text
+
+
 def test_an_export_without_further_states_says_so():
     with pytest.raises(tl.NotAvailable, match="motion fills"):
         stored_twin().export("twin.py", kind="gymnasium")

@@ -35,6 +35,7 @@ class Law(Value):
         offsets: delay of each state's readings against those of the driven states (n_x,), s.
         levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
         reports: what is given of readings (n_x,); none where all are given as they are.
+        begins: of states that stand for hidden ones where each begins, in words.
     """
 
     signals: Signals
@@ -45,6 +46,7 @@ class Law(Value):
     offsets: tuple[float, ...]
     levels: Levels = ()
     reports: Reports = ()
+    begins: tuple[str, ...] = ()
 
     @staticmethod
     def of(model: _core.Model, signals: Signals) -> Law:

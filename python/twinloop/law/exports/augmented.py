@@ -57,6 +57,10 @@ def augmented(law: Law) -> Law:
         (*law.offsets, *[0.0] * count),
         law.levels,
         (*law.reports, *[None] * count) if law.reports else (),
+        tuple(
+            f"{name} begins {'where it stands still under the first state' if moved_along else 'with 0'}"
+            for name, moved_along in zip(names, _along(stored), strict=True)
+        ),
     )
 
 
@@ -64,10 +68,14 @@ def begun(law: Law, state: Floats) -> Floats:
     """A state (n_x,) with what its law's stored hidden states are there at the start of a run."""
     stored = law.actuation.stored
     still = settled(law, state)[len(law.actuation.hidden) - len(stored) :]
+    return np.concatenate([state, np.where(_along(stored), still, 0.0)])
+
+
+def _along(stored: Sequence[HiddenState]) -> list[bool]:
+    """Which stored hidden states begin as the first state settles them; the others begin with 0."""
     # What is behind a gap moves along.
     behind = twists(stored).values()
-    along = [one.settled or place in behind for place, one in enumerate(stored)]
-    return np.concatenate([state, np.where(along, still, 0.0)])
+    return [one.settled or place in behind for place, one in enumerate(stored)]
 
 
 def _held(name: str, one: HiddenState, second: bool) -> State:

@@ -1,4 +1,4 @@
-"""Left out: what a twin's flights do that an exported law leaves to whoever closes the loop around it."""
+"""Left out: what an exported law leaves to whoever uses it: how hidden states begin, what is sent and what is read."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from twinloop.law.reports import in_words as reports_in_words
 
 
 def left_out(law: Law) -> list[str]:
-    """A line for each command that is sent in levels, and for each state that is not given as it is read.
+    """A line for each hidden state that is one of the states, command in levels, and state not given as it is read.
 
     Args:
         law: that is exported.
     """
     lines = levels_in_words(law.levels, law.signals) + reports_in_words(law.reports, law.signals)
-    return [f"{line}: not done here" for line in lines]
+    return [*law.begins, *(f"{line}: not done here" for line in lines)]
