@@ -733,6 +733,11 @@ def test_an_axis_may_be_an_angle_alone(tmp_path, alone):
         ("[first]", "[kinematics]\nangle = []\n[first]", "did you mean 'angles'"),
         (
             "[first]",
+            '[log]\ntorqe = "Out 1"\n[first]',
+            r"signal under \[log\] of .*'torqe': did you mean 'torque'",
+        ),
+        (
+            "[first]",
             '[kinematics]\nangles = ["angle"]\n[first]',
             r"\[kinematics\]: expected rates, found none",
         ),
