@@ -195,6 +195,15 @@ def latest_lesson(campaign: Campaign) -> Lesson | None:
     return last if isinstance(last, Lesson) else None
 
 
+def learnt(campaign: Campaign) -> int:
+    """How many of its experiments a campaign has learnt; they are the first ones.
+
+    Args:
+        campaign: to look at.
+    """
+    return len(campaign.history[-1].tests) if campaign.history else 0
+
+
 def behind(campaign: Campaign) -> bool:
     """Whether what was learnt last was interrupted, or is not of all runs.
 

@@ -17,7 +17,7 @@ from twinloop.campaign.presets import PRESETS
 from twinloop.campaign.system_section import SystemSection, said_by, system_section
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, at, unknown
-from twinloop.logs import TIME
+from twinloop.logs import TIME, refuse_others
 from twinloop.records import differences, read
 from twinloop.signals import Command as Channel
 from twinloop.signals import RigidBody, Signals, State
@@ -273,11 +273,8 @@ def read_file(path: str | Path, begun: System | None = None) -> CampaignFile:
         made = begun or system_named(flies.use, flies.arguments, signals, path.resolve().parent)
         signals = signals or made.signals
     assert signals is not None  # of the file, or of its system
-    for name in _section(found, "log", None, ()):
-        if name not in (TIME, *signals.state_names, *signals.command_names):
-            raise unknown(
-                f"signal under [log] of {path}", name, (TIME, *signals.state_names, *signals.command_names)
-            )
+    every = (TIME, *signals.state_names, *signals.command_names)
+    refuse_others(_section(found, "log", None, ()), every, f"under [log] of {path}")
     own = made is not None and "task" not in found
     task = said_by(made, TASK, path) if own else _section(found, "task", TASK, TASK)
     arguments = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from traceback import walk_tb
 from typing import TYPE_CHECKING
 
 from twinloop._ground.arrays import share, whole
@@ -16,6 +15,7 @@ from twinloop.signals import Signals
 from twinloop.store.uninterrupted import uninterrupted
 from twinloop.systems import System
 from twinloop.systems.patience import run_within
+from twinloop.systems.raised import came_through
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
@@ -133,6 +133,15 @@ def _refuse_silence(campaign: Campaign, test: Test) -> None:
         )
 
 
+def refused_an_answer(reason: BaseException) -> bool:
+    """Whether it was what the system answered that could not be entered; its test still waits.
+
+    Args:
+        reason: that came out of `campaign.run`.
+    """
+    return isinstance(reason, InvalidInput) and came_through(reason, _enter.__code__)
+
+
 def _next(campaign: Campaign, system: System, last: bool) -> Test:
     """What waits; a first test that was made; or one that is asked for now."""
     if campaign.waiting:
@@ -216,16 +225,6 @@ def _record(campaign: Campaign, test: Test, landed: list[Trajectory]) -> None:
             _enter(campaign, test, trajectory)
         except StoreFailure as failure:
             raise StoreFailure(f"{failure} {rescued(test, trajectory)}") from failure
-
-
-def refused_an_answer(reason: BaseException) -> bool:
-    """Whether it was what the system answered that could not be entered; its test still waits.
-
-    Args:
-        reason: that came out of `campaign.run`.
-    """
-    entered = any(frame.f_code is _enter.__code__ for frame, _ in walk_tb(reason.__traceback__))
-    return entered and isinstance(reason, InvalidInput)
 
 
 def _enter(campaign: Campaign, test: Test, trajectory: Trajectory) -> None:

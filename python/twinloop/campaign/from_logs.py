@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from twinloop._ground.texts import two_digits
 from twinloop.campaign.campaign import Campaign
 from twinloop.campaign.data.copies import copied
-from twinloop.campaign.examination.checking import LEFT
 from twinloop.campaign.examination.unseen import TwinBefore, Unseen, unseen_flights
 from twinloop.campaign.history import Progress, called
 from twinloop.controllers import StateFeedback
@@ -129,12 +126,11 @@ def _not_predicted(unseen: Sequence[Unseen], names: Sequence[str]) -> list[Remar
     return [
         serious(
             "held-out",
-            f"The twin does not predict {names[run.place]}, which was held out:"
-            f" {f'error {two_digits(run.error)}' if math.isfinite(run.error) else 'it diverges'}, at most {LEFT:g} is"
-            " allowed (0 is perfect, 1 a model that never moves). What it has learnt may hold for its own logs alone.",
+            f"The twin does not predict {names[run.place]}, which was held out: {run.error_words} (0 is perfect, 1 a"
+            " model that never moves). What it has learnt may hold for its own logs alone.",
         )
         for run in unseen
-        if not run.error <= LEFT
+        if not run.predicted_well
     ]
 
 

@@ -136,6 +136,15 @@ def finishes(book: Logbook, test: int) -> bool:
     return bool(runs) and all(run.complete for run in runs) and not failed(book, test)
 
 
+def was_lost(run: Experiment) -> bool:
+    """Whether a flight left its envelope or diverged.
+
+    Args:
+        run: that was recorded.
+    """
+    return run.left_envelope or run.trajectory.ended == "diverged"
+
+
 def failed(book: Logbook, test: int) -> bool:
     """Whether a test has failed on the system.
 

@@ -10,7 +10,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput, NotTrusted, unknown
 from twinloop.faces.answering import answer, json_option, name_option
-from twinloop.faces.opening import in_lines, opened_to_look, say_if_changed, say_if_unlearnt
+from twinloop.faces.opening import opened_to_look, say_if_changed, say_if_unlearnt, with_plain_progress
 from twinloop.law.exports.export import PRECISIONS, SUFFIXES
 from twinloop.law.twin import load_twin
 from twinloop.store import is_address
@@ -74,7 +74,7 @@ def export(
             made = twin.export(to, kind=of_file, precision=precision, force=force)
         else:
             known = look(source, name, read_only=True).name
-            held = in_lines(Campaign.load(source, known, read_only=True), known)
+            held = with_plain_progress(Campaign.load(source, known, read_only=True), known)
             say_if_changed(source, held, known)
             say_if_unlearnt(source, held, known)
             made = held.export_twin(to, kind=of_file, precision=precision, force=force)

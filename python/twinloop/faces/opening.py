@@ -16,6 +16,7 @@ from twinloop.campaign.keeping import gone_on_with, look
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import LINE_SECONDS, Watch
 from twinloop.faces.from_file import file_beside
+from twinloop.faces.telling import unlearnt
 from twinloop.store import shown_name
 
 BEGUN = "campaign"
@@ -45,9 +46,9 @@ def opened_by_hand(store: str, name: str | None = None, threads: int | None = No
                 " campaign, copy the file."
             )
         known = (gone_on_with(store, name) if Path(store).exists() else None) or name or BEGUN
-        return in_lines(read_file(file).campaign(store=store, name=known, threads=threads), known)
+        return with_plain_progress(read_file(file).campaign(store=store, name=known, threads=threads), known)
     if file is None or Path(store).exists():
-        return in_lines(Campaign.load(store, name, threads=threads), name or BEGUN)
+        return with_plain_progress(Campaign.load(store, name, threads=threads), name or BEGUN)
     raise InvalidInput(
         f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
         f" {to_type('new', file)}."
@@ -81,10 +82,10 @@ def opened_to_look(store: str, name: str | None) -> tuple[Campaign, str]:
     known = look(store, name, read_only=True).name
     campaign = Campaign.load(store, known, read_only=True)
     check_beside(store, campaign, known)
-    return in_lines(campaign, known), known
+    return with_plain_progress(campaign, known), known
 
 
-def in_lines(campaign: Campaign, name: str) -> Campaign:
+def with_plain_progress(campaign: Campaign, name: str) -> Campaign:
     """The same campaign; its progress is a line now and then where standard error has no place for its table.
 
     Args:
@@ -117,15 +118,11 @@ def not_kept(store: str, campaign: Campaign, name: str) -> str:
         campaign: as the store has it.
         name: of the campaign.
     """
-    learnt = len(campaign.history[-1].tests) if campaign.history else 0
-    missing = len(campaign.experiments) - learnt
+    missing = unlearnt(campaign)
     if not missing:
         return ""
     keeps = to_type("learn", shown_name(store), *(() if name == BEGUN else ("--name", name)))
-    return (
-        f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}. What is learnt now is not kept;"
-        f" to keep it: {keeps}."
-    )
+    return f"{missing}. What is learnt now is not kept; to keep it: {keeps}."
 
 
 def check_beside(store: str, campaign: Campaign, name: str) -> None:

@@ -9,17 +9,17 @@ from typing import Any
 import click
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.assessment import behind
+from twinloop.campaign.assessment import behind, learnt
 from twinloop.campaign.keeping import heading, look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.answering import json_option, name_option, next_command, threads_option
 from twinloop.faces.answers import DO_NOT_FLY
 from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
-from twinloop.faces.opening import in_lines, say_if_changed
+from twinloop.faces.opening import say_if_changed, with_plain_progress
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
-from twinloop.faces.telling import awaited, counted
+from twinloop.faces.telling import awaited, counted, unlearnt
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.withdrawing import named
@@ -77,7 +77,7 @@ def resume(
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
     """Learn from all recorded flights of a campaign of STORE, as the next ask would, without planning a test."""
     known, _ = heading(store, name)
-    with closing(in_lines(Campaign.load(store, known, threads=threads), known)) as campaign:
+    with closing(with_plain_progress(Campaign.load(store, known, threads=threads), known)) as campaign:
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
             _ = campaign.best_test
@@ -105,7 +105,7 @@ def show(store: str, name: str | None, as_json: bool) -> None:
     campaign.interrupted = True  # what was learnt so far is enough
     known = bool(campaign.experiments) and held.memory is not None and not knows_nothing(campaign)
     result = _result(campaign, held) if known else None
-    text = _sentences(stored_as, facts)
+    text = _sentences(stored_as, facts, unlearnt(campaign))
     if result is not None:
         # Looking took no time that anyone asks for.
         shown = {**result, "run_info": {**result["run_info"], "seconds": None}}
@@ -126,9 +126,8 @@ def _result(campaign: Campaign, held: Stored) -> dict[str, Any]:
 
 def _learnt(campaign: Campaign, held: Stored) -> str | None:
     """How far learning is, where a person flies or not every flight is learnt; None: as the result says it."""
-    learnt, told = len(campaign.history[-1].tests), len(campaign.experiments)
-    if learnt < told:
-        return f"learnt from {learnt} of"
+    if learnt(campaign) < len(campaign.experiments):
+        return f"learnt from {learnt(campaign)} of"
     return "learnt from" if held.experiments is None else None
 
 
@@ -168,7 +167,7 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
         "seed": campaign.setup.seed,
         "tests": len(held.logbook["tests"]),
         "told": len(campaign.experiments),
-        "learnt": len(campaign.history[-1].tests) if campaign.history else 0,
+        "learnt": learnt(campaign),
         "experiments": held.experiments,
         "waiting": [test.number for test in awaited(campaign)],
         "failed": [failure.test.number for failure in campaign.failures],
@@ -183,19 +182,15 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
     }
 
 
-def _sentences(stored_as: StoredAs, facts: dict[str, Any]) -> str:
+def _sentences(stored_as: StoredAs, facts: dict[str, Any], missing: str) -> str:
     of = "" if facts["experiments"] is None else f" of {facts['experiments']}"
     lines = [
         f"{stored_as.store}: campaign {facts['name']!r}, begun {facts['created']}.",
         f"Preset {facts['preset']}, seed {facts['seed']}.",
         f"Experiments recorded: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]
-    missing = facts["told"] - facts["learnt"]
     if missing:
-        lines.append(
-            f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}; to learn now:"
-            f" {stored_as.to_type('learn')}."
-        )
+        lines.append(f"{missing}; to learn now: {stored_as.to_type('learn')}.")
     for key, words in (("waiting", "waiting to be flown"), ("failed", "failed"), ("abandoned", "abandoned")):
         if facts[key]:
             numbers = ", ".join(str(number) for number in facts[key])

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop._ground.texts import whole_characters
 from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import learnt
 from twinloop.campaign.data.copies import copied, copy_of, saved_again
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
@@ -50,8 +51,21 @@ def counted(campaign: Campaign) -> str:
     Args:
         campaign: of them.
     """
-    told = len(campaign.experiments)
-    return f"{told} experiment{'' if told == 1 else 's'}"
+    return _experiments(len(campaign.experiments))
+
+
+def unlearnt(campaign: Campaign) -> str:
+    """How many experiments are not learnt yet, in words; empty where all are.
+
+    Args:
+        campaign: to look at.
+    """
+    missing = len(campaign.experiments) - learnt(campaign)
+    return f"Not learnt yet: {_experiments(missing)}" if missing > 0 else ""
+
+
+def _experiments(count: int) -> str:
+    return f"{count} experiment{'' if count == 1 else 's'}"
 
 
 def tell(

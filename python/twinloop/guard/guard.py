@@ -310,7 +310,7 @@ class Guard:
                 return self._trip(
                     f"the reading of {name} has not changed for too long, though by the twin it should have moved"
                 )
-        if self.horizon and self.period < self.test.steps:
+        if self._ahead.committee is not None and self.period < self.test.steps:
             near = self.signals.continued(reading[np.newaxis], self._middle)[0]
             found = self._ahead.leaves(near, self.horizon)
             self._leaving = 0 if found is None else self._leaving + 1

@@ -11,11 +11,10 @@ from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.logs.samples import Samples, Window, interpolated, mean_held, refuse_gaps
 from twinloop.remarks import note
-from twinloop.unmeasured import names_of
+from twinloop.unmeasured import logged, names_of
 
 if TYPE_CHECKING:
     from twinloop.logs.files import Log
-
 
 ROUNDING = 1e-9
 """Share of a period by which even times may be off it."""
@@ -47,8 +46,9 @@ def part_of(log: Log, window: Window) -> Log:
     rows = np.flatnonzero((since >= start - 1e-9) & (since <= stop + 1e-9))
     if len(rows) < 3 or len(rows) != rows[-1] - rows[0] + 1:
         raise InvalidInput(
-            f"Log {log.called}: expected at least three rows within {start:.6g} to {stop:.6g} s after its first one,"
-            f" found {len(rows)}; it has {float(since[-1]) if len(since) else 0.0:.6g} s."
+            f"Log {log.called}: expected at least three rows, one after the other, {start:.6g} s"
+            f"{f' to {stop:.6g} s' if np.isfinite(stop) else ' or more'} after its first one, found {len(rows)};"
+            f" its last one is {float(since[-1]) if len(since) else 0.0:.6g} s after it: name another part."
         )
     first, last = int(rows[0]), int(rows[-1])
     lines = None if log.lines is None else log.lines[first : last + 1]
@@ -90,10 +90,10 @@ def evenly(log: Log) -> Log:
     count = int((t[-1] - t[0]) / dt + 1e-6)
     times = np.asarray(t[0] + dt * np.arange(count + 1), dtype=np.float64)
     states = [
-        interpolated(
-            _known(log, name, column, times), log.signals.states[log.signals.state_names.index(name)], times
+        interpolated(_known(log, state.name, column, times), state, times)
+        for state, column in zip(
+            logged(log.signals, names_of(log.states, log.signals)), log.states.T, strict=True
         )
-        for name, column in zip(names_of(log.states, log.signals), log.states.T, strict=True)
     ]
     sent = np.vstack([log.commands, log.commands[-1:]])
     commands = [

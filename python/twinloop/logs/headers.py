@@ -28,6 +28,22 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join([*names[:SHOWN], *(["…"] if len(names) > SHOWN else [])]) or "none"
 
 
+def refuse_others(columns: Mapping[str, str], wanted: Sequence[str], where: str) -> None:
+    """Refuses columns of something that is no signal.
+
+    Args:
+        columns: what some signals are called in logs.
+        wanted: the signals' own names.
+        where: what messages call the place where that is said.
+
+    Raises:
+        InvalidInput: a name that is none of theirs.
+    """
+    for name in columns:
+        if name not in wanted:
+            raise unknown(f"signal {where}", name, wanted)
+
+
 def renamed(head: Sequence[str], columns: Mapping[str, str], wanted: Sequence[str], called: str) -> list[str]:
     """The header of a log with the names that signals have.
 
@@ -48,10 +64,9 @@ def renamed(head: Sequence[str], columns: Mapping[str, str], wanted: Sequence[st
         raise InvalidInput(
             f"Log {called}, columns: expected a column's name for each signal's, found {columns!r}; write a dict."
         )
+    refuse_others(columns, wanted, f"in the columns of the log {called}")
     own: dict[str, str] = {}
     for name, column in columns.items():
-        if name not in wanted:
-            raise unknown(f"signal in the columns of the log {called}", name, wanted)
         if isinstance(column, str):
             column = column.strip()
         if not isinstance(column, str) or column in own:

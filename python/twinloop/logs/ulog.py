@@ -13,6 +13,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.logs.headers import refuse_others
 from twinloop.logs.samples import Samples, Window, held, interpolated, refuse_gaps, without_jumps
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
@@ -121,9 +122,7 @@ def _fields(
                 f"Log {called}, columns: expected topic.field or topic/1.field for {name!r}, found {address!r}."
             )
         found[name] = match[1], int(match[2] or 0), match[3]
-    for name in columns:
-        if name not in names:
-            raise unknown(f"signal in the columns of the log {called}", name, names)
+    refuse_others(columns, names, f"in the columns of the log {called}")
     return found
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from traceback import walk_tb
 
 from twinloop._ground.arrays import number
 from twinloop.errors import NoAnswer
 from twinloop.guard.guarded import Guarded
 from twinloop.systems.base import System
+from twinloop.systems.raised import came_through
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -86,7 +86,7 @@ def raised_in_a_run(reason: BaseException) -> bool:
     Args:
         reason: that came out of `run_within`.
     """
-    return any(frame.f_code is _run.__code__ for frame, _ in walk_tb(reason.__traceback__))
+    return came_through(reason, _run.__code__)
 
 
 def _run(system: System, test: Test, landed: list[Trajectory]) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sysconfig
 from pathlib import Path
-from traceback import extract_tb
+from traceback import extract_tb, walk_tb
+from types import CodeType
 
 OURS = Path(__file__).parents[1]
 """The package, whose own lines tell a user nothing about theirs."""
@@ -24,6 +25,16 @@ def raised(reason: BaseException) -> str:
     place = f" in {Path(lines[-1].filename).name}, line {lines[-1].lineno}" if lines else ""
     text = " ".join(str(reason).split())
     return f"{type(reason).__name__}{place}{': ' if text else ''}{text}"
+
+
+def came_through(reason: BaseException, code: CodeType) -> bool:
+    """Whether an exception came out of a call of a function, or of something that it called.
+
+    Args:
+        reason: that was caught.
+        code: of the function.
+    """
+    return any(frame.f_code is code for frame, _ in walk_tb(reason.__traceback__))
 
 
 def _users_own(file: str) -> bool:

@@ -13,13 +13,12 @@ from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.delay_borne import MOST
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.reaching import REACHED, Ending
+from twinloop.campaign.examination.unseen import LEFT
 from twinloop.law.linear.margins import LoopMargins
 from twinloop.planning.leaving import risk_words
 from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 
-LEFT = 0.1
-"""Error on a flight that was not learnt, over that of a model that never moves, above which a twin is not believed."""
 INSIDE = 0.75
 """Share of the readings of such a flight that are asked for inside the 90 % band."""
 MISSES = 4.0
@@ -124,12 +123,11 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
         return
     last = found.unseen[-1]
     which = found.names[last.place]
-    good = last.error <= LEFT
-    by = f"error {two_digits(last.error)}" if math.isfinite(last.error) else "it diverged"
+    good = last.predicted_well
     yield Check(
         "unseen-flight", "twin", last.error, LEFT, good, True,
         f"Before learning it, the twin {'predicted' if good else 'did not predict'} {which}:"
-        f" {by}; at most {LEFT:g} is allowed.",
+        f" {last.error_words}.",
     )  # fmt: skip
     if last.inside is not None:
         wide = last.inside >= INSIDE

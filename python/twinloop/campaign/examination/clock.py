@@ -58,8 +58,7 @@ class Clock:
         """
         if not len(self.steps):
             return None
-        near = self.steps[self.steps <= FAR * self.dt]
-        return float(near.mean() if self._jitters else np.median(self.steps))
+        return float(self._near.mean() if self._jitters else np.median(self.steps))
 
     @property
     def jitter(self) -> float | None:
@@ -70,9 +69,13 @@ class Clock:
     @cached_property
     def _jitters(self) -> bool:
         """Whether most rows come late or early, around the declared period."""
-        near = self.steps[self.steps <= FAR * self.dt]
-        uneven = len(near) > 0 and float(np.median(np.abs(self.steps / self.dt - 1.0))) > JITTER
-        return uneven and not self._is_other(float(near.mean()))
+        uneven = len(self._near) > 0 and float(np.median(np.abs(self.steps / self.dt - 1.0))) > JITTER
+        return uneven and not self._is_other(float(self._near.mean()))
+
+    @cached_property
+    def _near(self) -> Floats:
+        """Steps in which no row was lost, however late one came."""
+        return self.steps[self.steps <= FAR * self.dt]
 
     def _is_other(self, period: float) -> bool:
         return abs(period / self.dt - 1.0) > JITTER

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import two_digits
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.law.accuracy import squares
@@ -15,6 +17,9 @@ from twinloop.law.pieces import held
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
 from twinloop.trajectory import Trajectory, continued
+
+LEFT = 0.1
+"""Error on a flight that was not learnt, over that of a model that never moves, above which a twin is not believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +51,17 @@ class Unseen:
     fit: Floats
     inside: float | None
     piece: int
+
+    @property
+    def predicted_well(self) -> bool:
+        """Whether the error is at most what is allowed."""
+        return self.error <= LEFT
+
+    @property
+    def error_words(self) -> str:
+        """The error beside what is allowed."""
+        by = f"error {two_digits(self.error)}" if math.isfinite(self.error) else "it diverged"
+        return f"{by}; at most {LEFT:g} is allowed"
 
 
 @dataclass(frozen=True, eq=False)

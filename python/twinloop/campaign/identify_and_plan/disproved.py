@@ -75,7 +75,7 @@ def _left_against_promise(run: Experiment) -> bool:
     """Whether a flight left or diverged that was predicted to come to its end, and began where that was predicted."""
     predicted = None if run.test is None else run.test.predicted
     promised = predicted is not None and math.isfinite(predicted) and not run.off_start
-    return promised and (run.left_envelope or run.trajectory.ended == "diverged")
+    return promised and standing.was_lost(run)
 
 
 def _foresees(planner: Planner, committee: Committee, test: Test) -> bool:

@@ -293,7 +293,7 @@ class IdentifyAndPlan:
         ends = np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
         every = without_wrong_readings(book.experiments, setup.signals)
         # Where one has left is no place where flights are known to be well.
-        flights = [run for run in every if not (run.left_envelope or run.trajectory.ended == "diverged")]
+        flights = [run for run in every if not standing.was_lost(run)]
         return Seen(
             standing.read_in(book, flights or inside(every)), np.stack([ends.min(axis=0), ends.max(axis=0)])
         )

@@ -24,7 +24,7 @@ from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
 from twinloop.faces.cautions import advised_to_stop, serious_of
 from twinloop.faces.columns import columns, columns_file
-from twinloop.faces.dashboard.desk import Desk, unlearnt
+from twinloop.faces.dashboard.desk import Desk, to_be_learnt
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.ends import ends, varying_words
 from twinloop.faces.opening import changed_since, fields_beside
@@ -219,7 +219,7 @@ class Pages:
         return {
             "experiments": len(campaign.experiments),
             "unlearnt": " ".join(
-                filter(None, [unlearnt(campaign), changed_since(self.desk.store, campaign, name)])
+                filter(None, [to_be_learnt(campaign), changed_since(self.desk.store, campaign, name)])
             ),
             "tests": [
                 {
@@ -261,7 +261,7 @@ class Pages:
             found = source(self.desk.store, name, self.desk.threads)
             if not found.campaign.history:
                 raise NotAvailable(
-                    f"Report: expected a learnt experiment, found none. {unlearnt(found.campaign)}"
+                    f"Report: expected a learnt experiment, found none. {to_be_learnt(found.campaign)}"
                 )
             self._reports[name] = now, source_page(found)
         return self._reports[name][1]

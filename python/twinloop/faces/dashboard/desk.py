@@ -21,6 +21,7 @@ from twinloop.faces.telling import (
     tell,
     tell_failed,
     to_be_flown,
+    unlearnt,
 )
 from twinloop.faces.withdrawing import chosen, given_up_words, recorded
 from twinloop.logs import Log
@@ -303,16 +304,14 @@ class Desk:
         return closing(Campaign.load(self.store, name, threads=self.threads, progress=None))
 
 
-def unlearnt(campaign: Campaign) -> str:
+def to_be_learnt(campaign: Campaign) -> str:
     """How many flights are not learnt yet, and what to do; empty where all are.
 
     Args:
         campaign: to look at.
     """
-    count = len(campaign.experiments) - (len(campaign.history[-1].tests) if campaign.history else 0)
-    if count <= 0:
-        return ""
-    return f"Not learnt yet: {count} experiment{'' if count == 1 else 's'}; to learn now, plan the next test."
+    missing = unlearnt(campaign)
+    return f"{missing}; to learn now, plan the next test." if missing else ""
 
 
 def _against(campaign: Campaign, flight: Experiment, asked: Test | None, read: Log) -> list[str]:

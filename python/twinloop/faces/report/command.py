@@ -12,7 +12,7 @@ from twinloop.faces.answering import answer, json_option, name_option
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture
 from twinloop.faces.files import check_writable
-from twinloop.faces.opening import in_lines, say_if_changed, say_if_unlearnt
+from twinloop.faces.opening import say_if_changed, say_if_unlearnt, with_plain_progress
 from twinloop.faces.report.alike import not_comparable, task_differences
 from twinloop.faces.report.comparison import compared, comparison, comparison_page
 from twinloop.faces.report.page import source_page, templates
@@ -52,7 +52,7 @@ def _opened(where: str, name: str | None) -> Source:
     say_if_changed(where, found.campaign, found.name)
     if found.sessions and not found.campaign.interrupted:  # a record in a file has none, and nothing keeps it
         say_if_unlearnt(where, found.campaign, found.name)
-    in_lines(found.campaign, found.name)
+    with_plain_progress(found.campaign, found.name)
     return found
 
 
