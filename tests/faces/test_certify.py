@@ -256,6 +256,17 @@ def test_figures_of_a_certificate_are_in_the_units_of_its_tables():
     assert _plots(prediction, ["share"], ["1"])[0]["words"] == "from 0 to 0.4 in 3600 s"
 
 
+def test_an_old_gain_that_is_not_known_is_a_dash(flown):
+    campaign, _ = flown
+    names, units = SIGNALS.state_names, [state.unit for state in SIGNALS.states]
+    found = dataclasses.replace(campaign.certificate(), old=None)
+    said = facts(campaign, found, "rig.db", "rig", None, {})
+    assert all(gain["old"] is None for gain in said["gains"])
+    shown = Page(page(said, names, units)).text
+    table = shown.partition("tuned between")[2].partition("Predicted flight")[0]
+    assert "–" in table and "∞" not in table
+
+
 def test_nothing_told_is_no_certificate():
     with pytest.raises(tl.NotAvailable, match="at least one recorded experiment"):
         rig_campaign().certificate()

@@ -234,7 +234,8 @@ def test_a_rig_that_answers_with_nothing_is_named_and_its_test_waits(folder, mon
     written(folder, PENDULUM, section("useless:useless"))
     stopped = run("run", "rig.toml", "--experiments", "2", "--threads", "1")
     assert stopped.exit_code == 1 and isinstance(stopped.exception, SystemExit)
-    assert "System 'useless:useless', what it answered. " in stopped.stderr and "found None" in stopped.stderr
+    assert "System 'useless:useless': its answer cannot be entered. " in stopped.stderr
+    assert "found None" in stopped.stderr
     assert "nothing is lost" in stopped.stderr and "Continue with: twinloop resume rig.db" in stopped.stderr
     assert f"Test waiting to be flown: {number}." in run("show", "rig.db").stdout
     assert ("1 experiment" in stopped.stdout) == (number == 1)

@@ -196,7 +196,7 @@ def _fault_of(name: str, reason: Exception, kept: bool) -> str | None:
     """What the code of a system did wrong, and what becomes of the test that it was to fly; None: nothing."""
     waits = "The test still waits and nothing is lost: correct that, then go on." if kept else "Correct that."
     if refused_an_answer(reason):
-        return f"System {name!r}, what it answered. {reason} {waits}"
+        return f"System {name!r}: its answer cannot be entered. {reason} {waits}"
     if isinstance(reason, TwinloopError) or not raised_in_a_run(reason):
         return None
     return f"System {name!r}: expected a run, found {raised(reason)}. {waits}"
