@@ -91,7 +91,7 @@ pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Learnt, Operand, Operati
 pub use actuators::{Actuation, Actuator, checked_effects};
 pub use any_dynamics::{AnyDynamics, AnyWorkspace};
 pub use dynamics::{Dynamics, state_of};
-pub use hidden::{Hidden, Play, Source};
+pub use hidden::{Hidden, Mass, Play, Pressed, Source};
 pub use integrator::{Field, Slopes, Stages, rk4};
 pub use levels::Levels;
 pub use model::{Form, Frame, Model, OwnedModel, views};

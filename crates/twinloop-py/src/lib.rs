@@ -9,6 +9,7 @@ mod excitation;
 mod flights;
 mod law;
 mod look_ahead;
+mod masses;
 mod model;
 mod objective;
 mod pareto;
@@ -44,6 +45,8 @@ mod _core {
     use crate::flights::{PyFlights, PyQuality, disagreements, qualities, usages};
     #[pymodule_export]
     use crate::look_ahead::PyLookAhead;
+    #[pymodule_export]
+    use crate::masses::behind_gap;
     #[pymodule_export]
     use crate::model::{PyModel, PySignals, command_effects};
     #[pymodule_export]

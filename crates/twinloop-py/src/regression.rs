@@ -188,9 +188,21 @@ impl PyGram {
         #[pyo3(from_py_with = given)] ridge: f64,
     ) -> Result<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
         let solved = |found: Solution| {
-            let covariance = to_matrix(py, subset.len(), found.covariance);
+            let covariance = to_matrix(py, subset.len(), found.covariance());
             (to_vector(py, found.coefficients), covariance, found.chi_squared)
         };
+        Ok(self.0.checked_solve(&subset, ridge)?.map(solved))
+    }
+
+    /// Coefficients and χ², for which the covariance need not be computed; none if the features are collinear.
+    #[pyo3(signature = (subset, ridge = 0.0))]
+    fn least_squares<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = given)] subset: Vec<usize>,
+        #[pyo3(from_py_with = given)] ridge: f64,
+    ) -> Result<Option<(Bound<'py, PyArray1<f64>>, f64)>> {
+        let solved = |found: Solution| (to_vector(py, found.coefficients), found.chi_squared);
         Ok(self.0.checked_solve(&subset, ridge)?.map(solved))
     }
 }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -37,6 +38,22 @@ def segments(begun: Floats, ended: Floats) -> list[slice]:
     return [slice(first, last + 1) for first, last in pairwise(places)]
 
 
+def differences(parts: Sequence[Floats], order: int) -> Floats:
+    """Differences of an order within parts, one part after another.
+
+    Args:
+        parts: readings between corners (rows, n_x).
+        order: of the differences.
+
+    Returns:
+        Those of all parts (rows, n_x); none of parts that are too short.
+    """
+    # Of all rows at once: there may be as many parts as periods.
+    number = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    found: Floats = np.diff(np.concatenate(parts), n=order, axis=0)[number[order:] == number[:-order]]
+    return found
+
+
 def roughness(parts: Sequence[Floats], order: int) -> Floats | None:
     """Variance of noise that would make the differences of an order as large as they are.
 
@@ -47,10 +64,10 @@ def roughness(parts: Sequence[Floats], order: int) -> Floats | None:
     Returns:
         Of each state (n_x,); None where there are too few.
     """
-    squares = [np.square(np.diff(part, n=order, axis=0)) for part in parts if len(part) > order]
-    if sum(len(found) for found in squares) < FEWEST:
+    squares = np.square(differences(parts, order))
+    if len(squares) < FEWEST:
         return None
-    found: Floats = np.concatenate(squares).mean(axis=0) / math.comb(2 * order, order)
+    found: Floats = squares.mean(axis=0) / math.comb(2 * order, order)
     return found
 
 
@@ -89,23 +106,31 @@ def middles(states: Floats, rows: Sequence[slice], numbers: Sequence[int]) -> Fl
 
 
 def _interpolated(part: Floats, number: int) -> Floats:
+    """The middle of each period, through so many neighbours around it, or the first or last of them near the ends."""
     number = min(number, len(part))
-    periods = np.arange(len(part) - 1)
-    first = np.clip(periods + 1 - number // 2, 0, len(part) - number)
-    found = np.zeros((len(periods), part.shape[1]))
-    for place in dict.fromkeys((periods - first).tolist()):
-        at = np.flatnonzero(periods - first == place)
-        for neighbour, weight in enumerate(_weights(number, place + 0.5)):
-            found[at] += weight * part[first[at] + neighbour]
+    weights, around = _weights(number), len(part) - number + 1
+    # Periods before those that have as many neighbours on both sides, these, and those after them.
+    before = number // 2 - 1
+    after = len(part) - 1 - before - around
+    found = np.zeros((len(part) - 1, part.shape[1]))
+    for neighbour in range(number):
+        of_each = weights[:, neighbour, np.newaxis]
+        found[:before] += of_each[:before] * part[neighbour]
+        found[before : before + around] += of_each[before] * part[neighbour : neighbour + around]
+        found[before + around :] += of_each[number - 1 - after :] * part[around - 1 + neighbour]
     return found
 
 
-def _weights(number: int, place: float) -> list[float]:
-    """Lagrange's weights of neighbours at 0, 1, 2 …, for a place between them."""
-    return [
-        math.prod((place - other) / (own - other) for other in range(number) if other != own)
-        for own in range(number)
-    ]
+@cache
+def _weights(number: int) -> Floats:
+    """Lagrange's weights of neighbours at 0, 1, 2 …, in the middle of each period between them (number − 1, number)."""
+    return np.array([
+        [
+            math.prod((place + 0.5 - other) / (own - other) for other in range(number) if other != own)
+            for own in range(number)
+        ]
+        for place in range(number - 1)
+    ])  # fmt: skip
 
 
 def integration_error(parts: Sequence[Floats], noise: Floats) -> Floats:
@@ -124,9 +149,6 @@ def integration_error(parts: Sequence[Floats], noise: Floats) -> Floats:
     if squares is None:
         return np.zeros(parts[0].shape[1])
     seen = squares > 4.0 * noise
-    most = np.max(
-        [np.abs(np.diff(part, n=SIMPSON, axis=0)).max(axis=0) for part in parts if len(part) > SIMPSON],
-        axis=0,
-    )
+    most = np.abs(differences(parts, SIMPSON)).max(axis=0)
     variances: Floats = np.where(seen, np.square(most / LEFT), 0.0)
     return variances

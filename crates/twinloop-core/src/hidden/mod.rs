@@ -2,9 +2,11 @@
 //! a machine and no sensor reads.
 
 mod filling;
+mod masses;
 mod storage;
 
 pub(crate) use filling::Filling;
+pub use masses::{Mass, Pressed};
 pub(crate) use storage::Storage;
 
 use crate::error::{Result, invalid};

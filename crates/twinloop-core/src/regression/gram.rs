@@ -112,14 +112,24 @@ pub struct Gram {
 }
 
 /// Least squares on a subset of features.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Solution {
     /// Of the subset's features, in its order.
     pub coefficients: Vec<f64>,
-    /// Their covariance under the noise of the whitening (k × k).
-    pub covariance: Vec<f64>,
     /// Residual sum of squares, χ².
     pub chi_squared: f64,
+    /// Of the inner products of columns of unit length.
+    factor: Cholesky,
+    /// Lengths of the columns.
+    lengths: Vec<f64>,
+}
+
+impl Solution {
+    /// The covariance of the coefficients under the noise of the whitening (k × k).
+    pub fn covariance(&self) -> Vec<f64> {
+        let (k, lengths, inverse) = (self.lengths.len(), &self.lengths, self.factor.inverse());
+        (0..k * k).map(|ab| inverse[ab] / (lengths[ab / k] * lengths[ab % k])).collect()
+    }
 }
 
 /// Rows that are multiplied into the products at once.
@@ -246,11 +256,11 @@ impl Gram {
             }
             sum
         };
-        let inverse = factor.inverse();
         Some(Solution {
             coefficients: scaled.iter().zip(&lengths).map(|(c, length)| c / length).collect(),
-            covariance: (0..k * k).map(|ab| inverse[ab] / (lengths[ab / k] * lengths[ab % k])).collect(),
             chi_squared: (self.total() - explained).max(0.0),
+            factor,
+            lengths,
         })
     }
 

@@ -209,7 +209,7 @@ impl<'a, V: Vector> Walk<'a, V> {
         let accept = |change: f64, stream: &mut Stream| {
             change <= 0.0 || {
                 let heat = heat();
-                heat > 0.0 && stream.uniform() < libm::exp(-change / heat)
+                heat > 0.0 && is_below_exp(stream.uniform(), change / heat)
             }
         };
         if kind == 0 || k == 0 {
@@ -265,6 +265,22 @@ impl<'a, V: Vector> Walk<'a, V> {
         }
         true
     }
+}
+
+/// Whether a number is below e^−x for an x above 0. Most are beyond 1 − x ≤ e^−x ≤ 1 / (1 + x), which are quick to compute.
+#[inline(always)]
+fn is_below_exp(number: f64, x: f64) -> bool {
+    number < 1.0 - x || (number * (1.0 + x) < 1.0 && number < libm::exp(-x))
+}
+
+/// The first number below an end from which on something holds; the end where it holds nowhere.
+fn first(end: usize, holds: impl Fn(usize) -> bool) -> usize {
+    let (mut low, mut high) = (0, end);
+    while low < high {
+        let middle = low.midpoint(high);
+        (low, high) = if holds(middle) { (low, middle) } else { (middle + 1, high) };
+    }
+    low
 }
 
 /// A loop, for a fold over both would be a call, without the instructions of the width.
@@ -337,12 +353,13 @@ impl Kernel for Walked<'_> {
         let cooling = libm::log(annealing.coldest / hottest);
         // The last tenth goes down only.
         let cooled = annealing.moves - annealing.moves / 10;
+        let heat =
+            |n: usize| if n < cooled { hottest * libm::exp(cooling * n as f64 / cooled as f64) } else { 0.0 };
+        let cold = first(annealing.moves, |n| heat(n) <= 20.0 * annealing.coldest);
         for n in 0..annealing.moves {
-            let heat =
-                || if n < cooled { hottest * libm::exp(cooling * n as f64 / cooled as f64) } else { 0.0 };
             // Early subsets are passed through only, but the best of a walk is often one that it never leaves again.
-            if walk.step(annealing.largest, heat, stream)
-                && (n % 16 == 0 || walk.energy() < kept[0].energy || heat() <= 20.0 * annealing.coldest)
+            if walk.step(annealing.largest, || heat(n), stream)
+                && (n % 16 == 0 || walk.energy() < kept[0].energy || n >= cold)
             {
                 keep(&walk, &mut kept);
             }
@@ -367,4 +384,24 @@ fn keep<V: Vector>(walk: &Walk<'_, V>, kept: &mut Vec<Found>) {
     let at = kept.partition_point(|found| found.energy <= energy);
     kept.insert(at, Found { subset, energy });
     kept.truncate(KEPT);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_number_is_below_an_exponential_where_it_is_computed_and_where_not(
+            number in 0.0..1.0_f64, x in 1e-9..50.0_f64,
+        ) {
+            prop_assert_eq!(is_below_exp(number, x), number < (-x).exp());
+        }
+
+        #[test]
+        fn what_holds_from_a_number_on_is_found_there(end in 0..1000_usize, from in 0..1200_usize) {
+            prop_assert_eq!(first(end, |n| n >= from), from.min(end));
+        }
+    }
 }

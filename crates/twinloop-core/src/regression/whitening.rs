@@ -29,6 +29,9 @@ pub(crate) struct Whitening {
 
 /// Variance of a reading that is to be ignored, in variances of its innovation.
 const IGNORED: f64 = 1e12;
+/// Change over a reading, in standard deviations of each of two states (squared), below which their covariance settles: some
+/// filters end in a cycle of roundings and would never repeat a covariance to the bit.
+const SETTLED: f64 = 1e-30;
 
 impl Whitening {
     /// For a record of which each reading has a weight: 1, or 0 to ignore it. `spread` is the sd of each first state.
@@ -78,14 +81,16 @@ impl Whitening {
             readings: weights.as_flattened().iter().filter(|&&w| w > 0.0).count(),
         };
         // What is known of the states settles: from there on each reading is taken in as the one before it.
-        let mut settled = None;
+        let (mut settled, mut diagonals) = (None, LogOfProduct::default());
         for weights in weights {
             if settled == Some(weights) {
-                whitening.repeat(weights);
+                whitening.repeat(D);
+                whitening.count(weights, &mut diagonals);
                 continue;
             }
             let before = covariance;
             whitening.update::<D, I>(&mut covariance, &noise.sensors, weights);
+            whitening.count(weights, &mut diagonals);
             covariance = congruent(&covariance, &transition);
             for i in 0..D {
                 for j in 0..D {
@@ -95,28 +100,17 @@ impl Whitening {
             for (i, row) in covariance.iter_mut().enumerate().skip(D) {
                 row[i] += noise.gust * (1.0 - correlation * correlation);
             }
-            settled = (covariance == before).then_some(weights);
+            settled = alike(&covariance, &before).then_some(weights);
         }
+        whitening.log_determinant = -2.0 * diagonals.log();
         whitening
     }
 
     /// Takes in a reading with the gain and the whitening matrix of the one before.
     #[inline(never)]
-    fn repeat(&mut self, weights: &[f64]) {
-        let states = weights.len();
+    fn repeat(&mut self, states: usize) {
         self.gains.extend_from_within(self.gains.len() - self.inner * states..);
         self.roots.extend_from_within(self.roots.len() - states * states..);
-        self.count(weights);
-    }
-
-    /// Adds what a reading has to the determinant: that of its whitening matrix, the last one, where its entries count.
-    #[inline(never)]
-    fn count(&mut self, weights: &[f64]) {
-        let states = weights.len();
-        let root = &self.roots[self.roots.len() - states * states..];
-        for (i, _) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            self.log_determinant -= 2.0 * libm::log(root[i * states + i]);
-        }
     }
 
     /// Takes in a reading: keeps its gain and its whitening matrix, and leaves what is not known yet once it is used.
@@ -153,7 +147,15 @@ impl Whitening {
             let counts = weights[i] > 0.0;
             self.roots.extend(root[i].map(|value| if counts { value } else { 0.0 }));
         }
-        self.count(weights);
+    }
+
+    /// Adds what a reading has to the determinant: that of its whitening matrix, the last one, where its entries count.
+    #[inline(always)]
+    fn count<const D: usize>(&self, weights: &[f64; D], diagonals: &mut LogOfProduct) {
+        let root = &self.roots[self.roots.len() - D * D..];
+        for i in (0..D).filter(|&i| weights[i] > 0.0) {
+            diagonals.times(root[i * D + i]);
+        }
     }
 
     /// The k-th reading, to be observed.
@@ -189,6 +191,43 @@ impl Reading<'_> {
 /// What the observer's step is linear in: a number, or one in each of several lanes.
 pub(crate) trait Linear: Copy + Add<Output = Self> + Mul<f64, Output = Self> {}
 impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Linear for T {}
+
+/// The logarithm of a product of many numbers: one logarithm for as many as a number holds the product of.
+struct LogOfProduct {
+    log: f64,
+    product: f64,
+}
+
+impl Default for LogOfProduct {
+    fn default() -> Self {
+        Self { log: 0.0, product: 1.0 }
+    }
+}
+
+impl LogOfProduct {
+    #[inline(always)]
+    fn times(&mut self, factor: f64) {
+        self.product *= factor;
+        if !(1e-100..1e100).contains(&self.product) {
+            *self = Self { log: self.log(), product: 1.0 };
+        }
+    }
+
+    #[inline(never)]
+    fn log(&self) -> f64 {
+        self.log + libm::log(self.product)
+    }
+}
+
+/// Whether a covariance is that of a reading before, but for rounding.
+fn alike<const I: usize>(covariance: &Small<I>, before: &Small<I>) -> bool {
+    (0..I).all(|i| {
+        (0..=i).all(|j| {
+            let change = covariance[i][j] - before[i][j];
+            change * change <= SETTLED * before[i][i] * before[j][j]
+        })
+    })
+}
 
 /// Sum of a row times a column, first entry first.
 #[inline(always)]
@@ -228,4 +267,35 @@ fn updated<const D: usize, const I: usize>(
         }
     }
     next
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_logarithm_of_a_product_is_the_sum_of_logarithms(
+            powers in prop::collection::vec(-40.0..40.0_f64, 0..300),
+        ) {
+            let mut product = LogOfProduct::default();
+            powers.iter().for_each(|&power| product.times(power.exp()));
+            let expected: f64 = powers.iter().sum();
+            prop_assert!((product.log() - expected).abs() < 1e-10 * (1.0 + powers.len() as f64));
+        }
+    }
+
+    #[test]
+    fn a_filter_that_has_settled_has_the_gain_that_solves_riccati_s_equation() {
+        // P⁻ = P⁻ − P⁻² / (P⁻ + r) + q, of a level that wanders by q and is read with r.
+        let (q, r, readings) = (0.01_f64, 0.25_f64, 2000);
+        let chain = Chain { states: 1, dt: 1.0, form: crate::model::Form::Increment };
+        let noise = Noise { sensors: vec![r], process: q, gust: 0.0, correlation_time: 1.0 };
+        let whitening = Whitening::new(&chain, &noise, &vec![1.0; readings], &[1.0]);
+        let before = 0.5 * (q + (q * q + 4.0 * q * r).sqrt());
+        let last = whitening.reading(readings - 1, 1);
+        assert!((last.gain[0] - before / (before + r)).abs() < 1e-12);
+        assert!((last.root[0] - (before + r).sqrt().recip()).abs() < 1e-12);
+    }
 }

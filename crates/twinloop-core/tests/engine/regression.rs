@@ -306,7 +306,7 @@ proptest! {
             prop_assert!(near(found.coefficients[i], expected[i][0], 1e-3));
             for j in 0..FEATURES {
                 let scale = (inverse[i][i] * inverse[j][j]).sqrt();
-                prop_assert!(near(found.covariance[i * FEATURES + j], inverse[i][j], scale));
+                prop_assert!(near(found.covariance()[i * FEATURES + j], inverse[i][j], scale));
             }
         }
         let explained: f64 = (0..FEATURES).map(|i| expected[i][0] * right[i][0]).sum();

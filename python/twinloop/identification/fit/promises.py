@@ -58,8 +58,8 @@ def promises(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[i
 
     def left(*more: int) -> float:
         """χ² after a step of what is tuned, and of more."""
-        solved = gram.solve([*more, *others], RIDGE)
-        return math.inf if solved is None else solved[2]
+        solved = gram.least_squares([*more, *others], RIDGE)
+        return math.inf if solved is None else solved[1]
 
     before = left()
     gains = {node: before - left(j) for j, node in enumerate(new)}

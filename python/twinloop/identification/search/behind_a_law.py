@@ -62,7 +62,8 @@ def _length(problem: Problem, chain: Chain) -> float:
     sensors, length = np.maximum(chain.rough, low), np.inf
     motion = (max(float(chain.rough[0]) / problem.dt, slow.white), slow.correlated, 10.0 * problem.dt)
     for _ in range(ROUNDS):
-        solved = regression.gram(sensors, motion, problem.workers).solve(list(range(len(terms))), RIDGE)
+        gram = regression.gram(sensors, motion, problem.workers)
+        solved = gram.least_squares(list(range(len(terms))), RIDGE)
         if solved is None:
             break
         ((sensors, motion, length),) = _core.most_likely_noises(

@@ -202,7 +202,7 @@ class CoupledTerms:
                     acceleration[:, :, np.newaxis],
                 )
                 chi_squared += gram.total
-                step = gram.solve(list(range(gram.features)), RIDGE)
+                step = gram.least_squares(list(range(gram.features)), RIDGE)
                 weights[i] = weights[i] if step is None else weights[i] + step[0]
             if best is None or chi_squared < best[0]:
                 best = chi_squared, equations
@@ -241,7 +241,7 @@ def thinned(gram: _core.Gram, subset: Sequence[int], costs: Floats) -> Chosen:
     """
     kept = list(subset)
     while True:
-        solved = gram.solve(kept)
+        solved = gram.least_squares(kept)
         if solved is None:
             kept = kept[:-1]
             continue
@@ -249,9 +249,9 @@ def thinned(gram: _core.Gram, subset: Sequence[int], costs: Floats) -> Chosen:
             return Chosen(kept, solved[0].tolist())
         tried = []
         for out in kept:
-            fewer = gram.solve([j for j in kept if j != out])
+            fewer = gram.least_squares([j for j in kept if j != out])
             if fewer is not None:
-                tried.append((fewer[2] - float(costs[out]), out))
-        if not tried or not min(tried)[0] < solved[2]:
+                tried.append((fewer[1] - float(costs[out]), out))
+        if not tried or not min(tried)[0] < solved[1]:
             return Chosen(kept, solved[0].tolist())
         kept.remove(min(tried)[1])

@@ -39,8 +39,8 @@ def drive(problem: Problem, chain: Chain, inputs: Sequence[int]) -> dict[int, fl
     def solved(*features: Floats) -> tuple[Floats, float]:
         columns = np.concatenate(features, axis=2)
         gram = problem.gram(chain, columns)
-        answer = gram.solve(range(columns.shape[2]), RIDGE)
-        return (np.zeros(columns.shape[2]), np.inf) if answer is None else (answer[0], answer[2])
+        answer = gram.least_squares(range(columns.shape[2]), RIDGE)
+        return (np.zeros(columns.shape[2]), np.inf) if answer is None else answer
 
     columns = problem.values([*problem.usable([problem.pool.one]), *inputs])
     found, least = np.zeros(len(inputs)), np.inf

@@ -203,7 +203,7 @@ def whitened(
         posed = []
         for regression, gram, walked, chain in zip(regressions, grams, found, chains, strict=True):
             coefficients = np.zeros(gram.features)
-            solved = gram.solve(walked[0][0]) if walked and walked[0][0] else None
+            solved = gram.least_squares(walked[0][0]) if walked and walked[0][0] else None
             if solved is not None:
                 coefficients[walked[0][0]] = solved[0]
             floor = floor_of(chain, problem.dt, problem.integration(chain))
@@ -239,7 +239,7 @@ def _quotients(
         support = tuple(j for j in subset if j >= len(upper))
         if not support or len(found) == TRIED:
             break
-        solved = gram.solve(list(subset)) if support not in found else None
+        solved = gram.least_squares(list(subset)) if support not in found else None
         if solved is None:
             continue
         weights = dict(zip(subset, solved[0].tolist(), strict=True))

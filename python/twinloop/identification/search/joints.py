@@ -320,9 +320,9 @@ class _Joints:
         """Description length of an acceleration by its known sum, under the noise that is known."""
         chain, terms = known.chain, self.problem.usable(list(known.weights))
         gram = self.problem.gram(chain, self.problem.values(terms))
-        solved = gram.solve(list(range(len(terms))), RIDGE)
+        solved = gram.least_squares(list(range(len(terms))), RIDGE)
         costs = prices(self.pool, terms, self.problem.readings(chain), len(self.problem.runs))
-        return np.inf if solved is None else solved[2] + float(costs.sum())
+        return np.inf if solved is None else solved[1] + float(costs.sum())
 
     def _sums(self, equations: Sequence[Equation], costs: Sequence[float]) -> list[Sum] | None:
         """Sums of the nodes of accelerations, each at the price of its own equation's terms."""

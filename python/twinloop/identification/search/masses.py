@@ -120,12 +120,12 @@ class _Trial:
     def of(problem: Problem, signals: Signals, chain: Chain, base: list[int]) -> _Trial:
         """With the noise that the terms leave."""
         [quiet] = first_noise(problem, [chain], base, gusts=False)
-        solved = problem.gram(quiet, problem.values(base)).solve(list(range(len(base))), RIDGE)
+        solved = problem.gram(quiet, problem.values(base)).least_squares(list(range(len(base))), RIDGE)
         place, stages = chain.states[0], problem.stages
         start, middle, end = (
             each[:, place] / signals.states[place].scale for each in (stages.start, stages.middle, stages.end)
         )
-        return _Trial(problem, quiet, base, np.inf if solved is None else solved[2], (start, middle, end))
+        return _Trial(problem, quiet, base, np.inf if solved is None else solved[1], (start, middle, end))
 
     def grid(self) -> list[Floats]:
         """Masses that are tried first (4, k), in groups that turn in the same time."""
@@ -151,6 +151,6 @@ class _Trial:
         columns = np.concatenate([problem.values(self.base), np.where(usable, pressed, 0.0)], axis=2)
         gram, left = problem.gram(self.chain, columns), np.full(masses.shape[1], np.inf)
         for i in np.flatnonzero(usable & (pressed != 0.0).any(axis=(0, 1))):
-            solved = gram.solve([*range(count), count + int(i)], RIDGE)
-            left[i] = np.inf if solved is None else solved[2]
+            solved = gram.least_squares([*range(count), count + int(i)], RIDGE)
+            left[i] = np.inf if solved is None else solved[1]
         return left

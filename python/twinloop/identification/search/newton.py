@@ -104,19 +104,19 @@ def _at(
         return None
     columns = np.concatenate([plain, above / values[:, :, np.newaxis]], axis=2)
     gram = problem.gram(chain, columns)
-    solved = gram.solve(list(range(gram.features)), RIDGE)
+    solved = gram.least_squares(list(range(gram.features)), RIDGE)
     if solved is None:
         return None
     ratio = (columns[:, :, plain.shape[2] :] * solved[0][plain.shape[2] :]).sum(axis=2)
     slopes = -(ratio / values)[:, :, np.newaxis] * under
-    return _Point(solved[2], columns, slopes)
+    return _Point(solved[1], columns, slopes)
 
 
 def _step(problem: Problem, chain: Chain, point: _Point) -> Floats | None:
     """By how much the constants below the line are to change."""
     columns = np.concatenate([point.columns, point.slopes], axis=2)
     gram = problem.gram(chain, columns)
-    solved = gram.solve(list(range(gram.features)), RIDGE)
+    solved = gram.least_squares(list(range(gram.features)), RIDGE)
     if solved is None:
         return None
     step: Floats = solved[0][point.columns.shape[2] :]

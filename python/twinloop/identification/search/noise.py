@@ -99,7 +99,7 @@ def first_noise(problem: Problem, chains: Sequence[Chain], terms: Sequence[int],
         readings = problem.readings(chain)
         for _ in range(2):
             gram = regression.gram(sensors, motion, problem.workers)
-            solved = gram.solve(list(range(len(usable))), RIDGE)
+            solved = gram.least_squares(list(range(len(usable))), RIDGE)
             if solved is None:
                 break
             ((sensors, found, _),) = _core.most_likely_noises(

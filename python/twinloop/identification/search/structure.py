@@ -203,7 +203,7 @@ def search_known(
 def weighed(problem: Problem, chain: Chain, usable: Sequence[int]) -> Weights | None:
     """Weights of terms that were found usable, all of which explain a chain together; None where they are collinear."""
     gram = problem.gram(chain, problem.values(usable))
-    solved = gram.solve(list(range(len(usable))), RIDGE)
+    solved = gram.least_squares(list(range(len(usable))), RIDGE)
     return None if solved is None else dict(zip(usable, solved[0].tolist(), strict=True))
 
 

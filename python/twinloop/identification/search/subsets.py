@@ -57,15 +57,15 @@ class Judge:
         """
 
         def judged(subset: tuple[int, ...]) -> Judged | None:
-            solved = self.gram.solve(list(subset))
+            if self.limits:
+                free = self.gram.solve(list(subset))
+                solved = None if free is None else bounded_solution(free, subset, self.limits)
+            else:
+                solved = self.gram.least_squares(list(subset))
             if solved is None:
                 return None
-            weights, _, chi_squared = solved
-            if self.limits:
-                weights, chi_squared = bounded_solution(solved, subset, self.limits)
-            held = [
-                j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in self.limits
-            ]
+            weights, chi_squared = solved
+            held = [j for i, j in enumerate(subset) if j in self.limits and weights[i] == 0.0]
             if held and len(held) < len(subset):
                 # A term that is held at 0 is no term.
                 return judged(tuple(j for j in subset if j not in held))
@@ -75,7 +75,7 @@ class Judge:
         needed = [i for i, each in bounds if excludes_zero(each) and np.isfinite(self.costs[i])]
         if must := _distinguishable(self.gram, needed):
             subsets = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
-            if all(self.gram.solve(list(subset)) is None for subset in subsets):
+            if all(self.gram.least_squares(list(subset)) is None for subset in subsets):
                 subsets.append(tuple(sorted(must)))
         found = [judged(subset) for subset in dict.fromkeys(subsets)]
         if not any(found):
@@ -88,6 +88,6 @@ def _distinguishable(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]
     """The features of a subset, in order, that those before them do not already span."""
     kept: list[int] = []
     for feature in subset:
-        if gram.solve([*kept, feature]) is not None:
+        if gram.least_squares([*kept, feature]) is not None:
             kept.append(feature)
     return tuple(kept)
