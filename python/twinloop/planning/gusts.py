@@ -80,7 +80,7 @@ class Gusts:
             test: to be flown.
         """
         parts = test.genes, test.initial_state, test.target_state, test.excitation
-        flight = (test.steps, *(None if part is None else part.tobytes() for part in parts))
+        flight = (test.steps, test.hold_back, *(None if part is None else part.tobytes() for part in parts))
         if flight not in self._flown:
             self._flown[flight] = self._moved(test)
         return self._flown[flight]

@@ -260,9 +260,12 @@ class Judge:
         genes: Floats,
         excitation: Floats | None = None,
         ends: Ends | None = None,
+        hold_back: HoldBack | None = None,
     ) -> Judged:
         """Flies candidates on members once, without noise, as for `judge`."""
-        return self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
+        return self.judge(
+            members, genes, np.zeros(self.signals.n_x), 1, excitation, ends, hold_back=hold_back
+        )
 
     def as_flown(
         self, members: Sequence[_core.Model], test: Test, sds: Floats, draws: int
@@ -281,7 +284,8 @@ class Judge:
         """
         genes = test.genes[np.newaxis]
         excitation = None if test.excitation is None else test.excitation[np.newaxis]
-        lasting = self.stable_members(members, genes, excitation)
+        quiet = self.quiet(members, genes, excitation, hold_back=test.hold_back)
+        lasting = list(compress(members, quiet.stable))
         judged = self.judge(lasting, genes, sds, draws, excitation, measured=True, hold_back=test.hold_back)
         return lasting, judged
 

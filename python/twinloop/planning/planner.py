@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
 from twinloop import _core
+from twinloop._experiment.envelope import outside
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
@@ -20,7 +22,7 @@ from twinloop.planning.candidates import Candidates, candidates, directions_of, 
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, swing_of
 from twinloop.planning.gains import scores_of, tune_gains
-from twinloop.planning.judging import Committee, Judge, Task
+from twinloop.planning.judging import Committee, Judge, Task, expected, risk
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
 from twinloop.planning.reach import bounds_of, reach_of
@@ -190,6 +192,29 @@ class Planner(Judge):
         swing = swing_of(self.task.steps * self.signals.dt)
         found = HoldBack.between(self.signals, start, target, swing, reached, by)
         return HoldBack.between(self.signals, start, target, swing, reached) if found is None else found
+
+    def held(self, committee: Committee, found: Proposal, hold_back: HoldBack) -> Proposal:
+        """A proposal with what is predicted of it while its excitation is held back.
+
+        Args:
+            committee: that judges.
+            found: with an excitation.
+            hold_back: what holds it back.
+        """
+        genes, start, target = (
+            part[np.newaxis] for part in (found.genes, found.initial_state, found.target_state)
+        )
+        excitation = None if found.excitation is None else found.excitation[np.newaxis]
+        quiet = self.quiet(committee.members, genes, excitation, (start, target), hold_back)
+        members = list(compress(committee.members, quiet.stable))
+        flights = self.judge(
+            members, genes, committee.sds, self.options.draws, excitation, (start, target), measured=True,
+            hold_back=hold_back,
+        )  # fmt: skip
+        predicted, spread = expected(flights.qualities[:, :, 0])
+        inside = quiet.of(quiet.stable).worst_usage[0] <= 1.0 - self.options.margin
+        safe = bool(inside and not outside(flights.usages).any())
+        return replace(found, predicted=predicted, spread=spread, risk=risk(flights.usages), safe=safe)
 
     def excites(self, committee: Committee) -> bool:
         """Whether flights excite the commands that answer to states of which a committee knows no law, held back."""

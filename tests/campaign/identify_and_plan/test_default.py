@@ -12,6 +12,7 @@ from lives import CONTROLLER, SIGNALS, THOROUGH, StopAt
 from oracles import rk4, same_bits
 from strategies import program_text
 from twinloop import _core
+from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign import controller_to_fly, standing
 from twinloop.campaign.entering import check_first_reading
 from twinloop.campaign.identify_and_plan import learning
@@ -413,6 +414,25 @@ def test_where_gains_make_no_difference_on_the_twin_the_best_ones_fly_again_held
     assert np.abs(test.excitation).max() > 1.5 * np.abs(first.excitation).max()
     assert "does not know yet what the commands do" in test.reason
     assert told(begin(), pendulum).ask().hold_back is None
+
+
+def test_what_is_predicted_of_a_flight_that_is_held_back_is_predicted_held_back(begin, pendulum):
+    # Nothing of the excitation is sent once the angle has moved by a fiftieth of its way.
+    tight = HoldBack([[-0.01, 0.01], [-9.0, 9.0]], [[-0.02, 0.02], [-10.0, 10.0]])
+    with (
+        mock.patch.object(method_of_default, "gains_count", return_value=False),
+        mock.patch.object(Planner, "held_back", return_value=tight),
+    ):
+        campaign = told(begin(), pendulum)
+        test = campaign.ask()
+    assert test.hold_back is tight
+
+    def simulated(test):
+        found = campaign.twin.simulate(test)
+        return campaign.setup.quality.flown(found, test.target_state)
+
+    held, whole = simulated(test), simulated(replace(test, hold_back=None))
+    assert abs(test.predicted - held) < 0.2 * abs(whole - held)
 
 
 def test_gains_are_not_tuned_on_lesser_models_where_nothing_that_is_commanded_moves_the_best_one(

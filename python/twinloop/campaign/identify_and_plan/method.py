@@ -209,8 +209,11 @@ class IdentifyAndPlan:
         return test
 
     def _expected(self, book: Logbook, committee: Committee, found: Proposal) -> Proposal:
-        """A proposal with what known disturbances and the record of earlier predictions make of it."""
-        gusts = committee.moved_by_gusts(self._as_test(book, found))
+        """A proposal with what holding back, known disturbances and the record of earlier predictions make of it."""
+        hold_back = self._held_back(book, committee, found)
+        if hold_back is not None:
+            found = self.planner.held(committee, found, hold_back)
+        gusts = committee.moved_by_gusts(replace(self._as_test(book, found), hold_back=hold_back))
         predicted, spread = gusts.added_to(found.predicted, found.spread)
         spread = calibrated(spread, predicted, book.experiments, self._latest().misses)
         own = standing.fared(book, found.genes, found.excitation is not None)
