@@ -203,15 +203,24 @@ def recorded_as(run: Trajectory, other: Trajectory, signals: Signals) -> bool:
     return equal_runs(completed(run, signals, other.states[0]), other)
 
 
-def begins_as(one: Trajectory, other: Trajectory) -> bool:
-    """Whether a run has the states and commands with which another one begins, to the last digit.
+def row_in(one: Trajectory, other: Trajectory) -> int | None:
+    """The row from which on another run has the states and commands of a run, to the last digit; None: there is none.
 
     Args:
         one: run.
         other: a longer run.
     """
-    pairs = (one.states, other.states), (one.commands, other.commands)
-    return one.steps < other.steps and all(np.array_equal(a, b[: len(a)]) for a, b in pairs)
+    rows, later = len(one.states), other.steps - one.steps
+    if later < 1:
+        return None
+    # Most places are ruled out by three rows.
+    looked_at = [0, rows // 2, rows - 1]
+    alike = [(other.states[at : at + later + 1] == one.states[at]).all(axis=1) for at in looked_at]
+    for row in np.flatnonzero(np.logical_and.reduce(alike)).tolist():
+        pairs = (one.states, other.states), (one.commands, other.commands)
+        if all(np.array_equal(a, b[row : row + len(a)]) for a, b in pairs):
+            return int(row)
+    return None
 
 
 def continued(trajectory: Trajectory, signals: Signals, start: Floats) -> Trajectory:

@@ -84,6 +84,19 @@ def test_an_attached_flight_is_withdrawn_by_its_log_or_its_place(flights, which)
     assert [run.number for run in look().experiments] == [0]
 
 
+def test_an_attached_flight_is_withdrawn_by_the_name_of_its_log_once_that_is_elsewhere(flights):
+    (flights / "old.csv").rename(flights / "moved.csv")
+    assert "Saved: the attached log old.csv withdrawn" in withdrawn("old.csv").stdout
+
+
+def test_a_part_of_a_flight_is_noticed_wherever_it_is_from(flights):
+    head, *rows = (flights / "old.csv").read_text("utf-8").splitlines(keepends=True)
+    (flights / "part.csv").write_text("".join([head, *rows[7:19]]), encoding="utf-8")
+    said = run("attach", "rig.db", "part.csv")
+    assert said.exit_code == 0, said.output
+    assert "of 30 steps has the same 11 steps, from row 7 on, to the last digit" in said.stderr
+
+
 def test_the_answer_names_the_log_that_was_withdrawn_where_it_is_known(flights):
     with closing(tl.Campaign.load("rig.db")) as campaign:
         campaign.attach(by_hand(25))
@@ -99,14 +112,14 @@ def test_the_answer_names_the_log_that_was_withdrawn_where_it_is_known(flights):
 
 
 @pytest.mark.parametrize(
-    ("which", "taken", "left"),
+    ("which", "number", "taken", "left"),
     [
-        ("0", "20 steps, completed", "9 steps, aborted: wind"),
-        ("cut.csv", "9 steps, aborted: wind", "20 steps, completed"),
+        ("0", 2, "20 steps, completed", "9 steps, aborted: wind"),
+        ("cut.csv", 1, "9 steps, aborted: wind", "20 steps, completed"),
     ],
 )
 def test_a_flight_that_is_the_beginning_of_another_record_is_noticed_and_withdrawn(
-    flights, which, taken, left
+    flights, which, number, taken, left
 ):
     withdrawn("0")
     rows = (flights / "flight0.csv").read_text("utf-8").splitlines(keepends=True)
@@ -115,9 +128,10 @@ def test_a_flight_that_is_the_beginning_of_another_record_is_noticed_and_withdra
     assert cut.exit_code == 0 and "count twice" not in cut.stderr
     whole = run("tell", "rig.db", "0", "flight0.csv")
     assert "A flight of test 0 of 9 steps has the same first 9 steps" in whole.stderr
+    assert "It is flight 2 of this test" in whole.stdout and "It is flight" not in cut.stdout
     assert "twinloop withdraw rig.db LOG --reason WHY" in whole.stderr
     said = withdrawn(which).stdout
-    assert f"Saved: the flight of test 0 ({taken}) withdrawn; 2 experiments" in said
+    assert f"Saved: the flight of test 0 (number {number} of the 2 told: {taken}) withdrawn; 2 exp" in said
     assert f"Still recorded of test 0: {left}." in said and "Its right log" not in said
 
 

@@ -205,6 +205,11 @@ def tell(
             "quality": runs[-1].quality if runs else None,
         }
         remarks = [] if read is None else against_it(campaign, runs[-1], asked, read)
+        if len(runs) > 1 and failed is None:
+            text += (
+                f" It is flight {len(runs)} of this test, and all of them are learnt from; to take the last one back:"
+                f" {next_command(campaign, 'withdraw', test, '--reason', 'WHY')}"
+            )
         answer({**_standing(campaign, asked), **quality, "remarks": remarks}, text, as_json)
         _say(campaign, remarks, test)
 

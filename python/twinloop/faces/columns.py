@@ -29,8 +29,9 @@ def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
     """
     signals = test.family.signals
     columns = {TIME: signals.dt * np.arange(test.steps + 1)}
-    if test.excitation is not None:
-        columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
+    # Also where nothing is added: a program that flew the tests before reads these columns.
+    added = np.zeros((test.steps, signals.n_u)) if test.excitation is None else test.excitation
+    columns |= {f"excitation_{n}": added[:, i] for i, n in enumerate(signals.command_names)}
     columns |= {f"target_{name}": rows for name, rows in varying(test).items()}
     if predicted is not None:
         for i, name in enumerate(signals.state_names):

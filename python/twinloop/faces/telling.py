@@ -18,7 +18,7 @@ from twinloop.errors import InvalidInput
 from twinloop.faces.answering import next_command
 from twinloop.logs import Log, read_log
 from twinloop.test import Test
-from twinloop.trajectory import Trajectory, begins_as, check_period, recorded_as
+from twinloop.trajectory import Trajectory, check_period, recorded_as, row_in
 
 
 def numbered(campaign: Campaign, number: int) -> Test:
@@ -255,17 +255,19 @@ def _told_twice(campaign: Campaign, flight: Experiment, test: Test | None) -> li
         if other is flight or (test is not None and _again(other.test, test)):
             continue
         short, long = sorted((run, other.trajectory), key=lambda each: each.steps)
-        exact = begins_as(short, long)
+        row = row_in(short, long)
+        exact = row is not None
         if exact or copied(run, other.trajectory, campaign.signals):
             of = "an attached flight" if other.number is None else f"a flight of test {other.number}"
             withdraw = next_command(campaign, "withdraw", "LOG", "--reason", "WHY")
+            which = f"{short.steps} steps, from row {row} on," if row else f"first {short.steps} steps"
             how = (
                 "to the last digit"
                 if exact
                 else "but for digits far below the noise, which no two flights share"
             )
             said.append(
-                f"{of.capitalize()} of {other.trajectory.steps} steps has the same first {short.steps} steps {how},"
+                f"{of.capitalize()} of {other.trajectory.steps} steps has the same {which} {how},"
                 " so that they count twice: withdraw the"
                 f" {'shorter record' if short.steps < long.steps else 'one that is the copy'} by its log: {withdraw}"
             )

@@ -85,6 +85,10 @@ def chosen(campaign: Campaign, which: str, columns: Mapping[str, str] | None = N
         equal = [each for each in campaign.experiments if recorded_as(run, each.trajectory, campaign.signals)]
         if equal:
             return equal[-1]
+    # Its log may have been moved since.
+    called = [run for run in campaign.experiments if run.log == which]
+    if len(called) == 1 and not Path(which).is_file():
+        return called[0]
     raise InvalidInput(
         f"twinloop withdraw: expected the number of a test, a log as it was recorded, or {_names(attached)},"
         f" found {which}; nothing was changed."
@@ -102,7 +106,9 @@ def _which(campaign: Campaign, before: Sequence[Experiment]) -> str:
     if last.run is None:
         return ""
     place = last.run - sum(each.run is not None and each.run < last.run for each in earlier)
-    return f" ({_described(before[place])})"
+    alike = [run for run in before if run.number == before[place].number]
+    number = 1 + next(i for i, run in enumerate(alike) if run is before[place])
+    return f" (number {number} of the {len(alike)} told: {_described(before[place])})"
 
 
 def _described(run: Experiment) -> str:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-9
 """Share of a period by which even times may be off it."""
+EARLY = 0.05
+"""Periods by which the last row may come early: what it reads is then read at its time."""
 BETWEEN = 2.5
 """Periods by which two readings may be apart: one is missing, and both come at their own time."""
 
@@ -87,7 +89,7 @@ def evenly(log: Log) -> Log:
     off = float(np.abs(np.diff(t) / dt - 1.0).max())
     if off < ROUNDING:
         return log
-    count = int((t[-1] - t[0]) / dt + 1e-6)
+    count = int((t[-1] - t[0]) / dt + EARLY)
     times = np.asarray(t[0] + dt * np.arange(count + 1), dtype=np.float64)
     states = [
         interpolated(_known(log, state.name, column, times), state, times)

@@ -110,7 +110,7 @@ def _follows(follows: bool, worst: float) -> str:
 
 
 def _error(worst: float) -> str:
-    return f"error at most {two_digits(worst)}" if math.isfinite(worst) else "on one it diverges"
+    return f"error at most {two_digits(worst)}" if math.isfinite(worst) else "on at least one it diverges"
 
 
 def _of_unseen(found: Examination) -> Iterator[Check]:
@@ -161,7 +161,7 @@ def _of_innovations(found: Examination) -> Iterator[Check]:
         shows = "would show" if white else "shows"
         yield Check(
             name, "twin", these.outside, COLOURED, white, True,
-            f"{100.0 * these.outside:.0f} % of the correlations {words} are beyond their 99 % limits; more than"
+            f"{100.0 * these.outside:.3g} % of the correlations {words} are beyond their 99 % limits; more than"
             f" {100.0 * COLOURED:.0f} % {shows} an effect that the twin lacks.",
         )  # fmt: skip
 

@@ -22,7 +22,7 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
-from twinloop.faces.cautions import advised_to_stop, serious_of
+from twinloop.faces.cautions import advised_to_stop, not_reliable, serious_of
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.dashboard.desk import Desk, to_be_learnt
 from twinloop.faces.dashboard.fence import App, Fence
@@ -216,6 +216,7 @@ class Pages:
         units = {gain.name: gain.unit for gain in campaign.family.law_gains}
         bounded = is_bounded(campaign.signals)
         advice = advised_to_stop(campaign) if to_be_flown(campaign) else None
+        unreliable = " ".join(not_reliable(stored_as, serious_of(latest_lesson(campaign))))
         return {
             "experiments": len(campaign.experiments),
             "unlearnt": " ".join(
@@ -239,6 +240,7 @@ class Pages:
                     if test.risk is None
                     else None,
                     "advice": advice,
+                    "unreliable": unreliable,
                     "reason": reason(test, flown=bool(campaign.history), chosen=is_chosen(campaign, test)),
                     "ends": _ends(test),
                     "varies": varying_words(test, columns_file(stored_as, test).name),

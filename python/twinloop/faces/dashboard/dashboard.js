@@ -62,6 +62,8 @@
     one("h3").textContent = "Test " + test.number;
     one(".advice").hidden = !test.advice;
     one(".advice").textContent = test.advice;
+    one(".unreliable").hidden = !test.unreliable;
+    one(".unreliable").textContent = test.unreliable;
     one(".reason").textContent = test.reason || "";
     const rows = Object.entries(test.gains);
     if (test.predicted !== null) rows.push(["quality predicted", (test.predicted + (test.spread === null ? "" : " ± " + test.spread) + " " + test.unit).trim()]);
