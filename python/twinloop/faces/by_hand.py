@@ -16,7 +16,7 @@ from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.persistence import stored_as
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.answering import answer, json_option, name_option, next_command, threads_option
-from twinloop.faces.cautions import advised_to_stop, serious_of
+from twinloop.faces.cautions import advised_to_stop, serious_of, thin_margins
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.files import check_writable
 from twinloop.faces.first_test import first_test
@@ -152,6 +152,7 @@ def _shown(campaign: Campaign, test: Test, advice: str) -> tuple[str, dict[str, 
         flown,
         chosen,
         fields_beside(place.store),
+        thin_margins(campaign, test),
     )
     return text, facts(test, file, flown, predicted, against_twin, advice, chosen)
 

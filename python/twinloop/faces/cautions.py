@@ -1,4 +1,4 @@
-"""Cautions on a test sheet: advice to stop, a band that leaves the envelope, a twin that is not reliable."""
+"""Cautions on a test sheet: advice to stop, bands that leave the envelope, thin margins, unreliable twins."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop._experiment.envelope import band_outside
+from twinloop._ground.texts import enumerated
+from twinloop._ground.times import shown_time
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import controller_to_fly
+from twinloop.campaign.examination.checking import FRAGILE, PERIODS
 from twinloop.campaign.history import Lesson
+from twinloop.errors import NotAvailable
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.store import StoredAs
+from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 
@@ -75,6 +80,35 @@ def advised_to_stop(campaign: Campaign) -> str:
         "The advice is to stop: for the controller another flight would bring less than the scatter of one"
         " measurement."
     )
+
+
+def thin_margins(campaign: Campaign, test: Test) -> list[str]:
+    """That a certificate would refuse the gains of a test for their margins on the twin: a line, or none.
+
+    Args:
+        campaign: that has planned it.
+        test: of it.
+    """
+    if test.predicted is None or not campaign.twin.follows:
+        return []
+    try:
+        worst = campaign.margins(test.genes).worst
+    except NotAvailable:
+        return []
+    unstable = [loop.loop for loop in worst if not loop.stable]
+    if unstable:
+        found = [f"the loops around the target are not stable ({enumerated(unstable)})"]
+    else:
+        least, latest = max(worst, key=lambda loop: loop.sensitivity), min(worst, key=lambda loop: loop.delay)
+        found = []
+        if least.sensitivity > FRAGILE:
+            found.append(f"the sensitivity of {least.loop} is {least.sensitivity:.3g}, above {FRAGILE:g}")
+        if latest.delay < PERIODS * test.family.signals.dt:
+            more = shown_time(latest.delay)
+            found.append(f"{more} more delay, less than a period, make the loop of {latest.loop} unstable")
+    said = " and ".join(found)
+    cut = "Cut the flight if it begins to oscillate; a certificate of these gains would be refused."
+    return [f"On the twin {said}. {cut}"] if found else []
 
 
 def serious_of(lesson: Lesson | None) -> list[Remark]:

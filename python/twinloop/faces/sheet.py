@@ -11,7 +11,8 @@ import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.arrays import Floats
-from twinloop._ground.texts import two_digits
+from twinloop._ground.texts import in_unit, two_digits
+from twinloop.campaign.data.begun import allowed_off
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
 from twinloop.faces.ends import ends, varying, varying_words
@@ -224,6 +225,13 @@ def facts(
     }
 
 
+def _begin_within(test: Test) -> str:
+    """How far from its start a flight may begin and still be compared."""
+    allowed = zip(test.signals.states, allowed_off(test).tolist(), strict=True)
+    ranges = ", ".join(f"{state.name} ± {in_unit(f'{off:.3g}', state.unit)}" for state, off in allowed)
+    return f"Begin within {ranges}: a flight from elsewhere is learnt from, but its quality is not compared."
+
+
 def _held_back(test: Test, file: str) -> list[str]:
     """How a person's own program holds the excitation back; nothing where nothing does."""
     ranges = hold_back_ranges(test)
@@ -271,6 +279,7 @@ def sheet(
     flown: bool = False,
     chosen: bool = False,
     called: Mapping[str, str] = MappingProxyType({}),
+    margins: Sequence[str] = (),
 ) -> str:
     """The test sheet, to be printed.
 
@@ -286,6 +295,7 @@ def sheet(
         flown: whether any test was flown yet, recorded or failed; attached flights are of none.
         chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
         called: what columns of logs are called, by signal, where they have other names.
+        margins: what is said of them where they are thin.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, value, units[name]] for name, value in _set(test).items()]
@@ -296,6 +306,8 @@ def sheet(
         table(["set this gain", "to", "unit"], gains),
         "",
         *_ends(test, file),
+        "",
+        _begin_within(test),
         "",
         excitation_words(test, file),
         *_held_back(test, file),
@@ -316,6 +328,7 @@ def sheet(
     )
     lines.append(f"Risk of {risk_of_what(bounded)}: {risk}")
     lines += band_leaves(signals, predicted)
+    lines += margins
     lines += not_reliable(stored_as, against)
     lines += [reason(test, predicted is not None, chosen), *_alike(test, waiting)]
     lines += [f"{one}." for one in in_words(signals)]

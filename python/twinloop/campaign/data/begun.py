@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import in_unit
 from twinloop.campaign.data.turning import turning
 from twinloop.identification.records import Run, guessed_noise
@@ -30,6 +31,18 @@ LEAST = 0.01
 """Share of a state's scale by which it is off at least."""
 
 
+def allowed_off(test: Test) -> Floats:
+    """By how much each state may be off where a test starts, beside noise: a tenth of its way, or of its scale (n_x,).
+
+    Args:
+        test: to be flown.
+    """
+    signals, start = test.signals, np.asarray(test.initial_state)
+    way = np.abs(signals.difference(np.atleast_2d(test.target_state)[-1], start))
+    allowed: Floats = SHARE * np.where(way > 0.0, way, [state.scale for state in signals.states])
+    return allowed
+
+
 def off_start(test: Test, run: Trajectory) -> tuple[int, ...]:
     """States whose first reading is not where a test starts, more than noise and a tenth of their way from it.
 
@@ -38,10 +51,7 @@ def off_start(test: Test, run: Trajectory) -> tuple[int, ...]:
         run: the flight.
     """
     signals, start = test.signals, np.asarray(test.initial_state)
-    target = np.atleast_2d(test.target_state)[-1]
-    scales = np.array([state.scale for state in signals.states])
-    way = np.abs(signals.difference(target, start))
-    allowed = SHARE * np.where(way > 0.0, way, scales)
+    scales, allowed = np.array([state.scale for state in signals.states]), allowed_off(test)
     noise = np.sqrt(guessed_noise([Run.of(run.states, run.commands).continued(signals)], scales))
     off = np.abs(signals.difference(run.states[0], start))
     return tuple(np.flatnonzero(off > np.maximum(allowed, NOISE * noise)).tolist())

@@ -34,7 +34,7 @@ class Answer:
     Args:
         identified: a model and a committee.
         followed: free runs of the members.
-        follows: whether the best of them follows at least half of the flights.
+        follows: whether the best of them follows at least half of the flights that tell.
         causes: of the correlated disturbances, by the state that each drives.
         unmoved: states that move, and nothing moves them by the law.
         missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
@@ -104,7 +104,8 @@ class Answer:
         model, unit = identified.members[0], Unit(setup.seed).part(len(flights), 1, number)
         missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
-        follows = 2 * len(lost) <= len(flights)
+        can_tell = _can_tell(flights, bool(noise.correlated) and not missed)
+        follows = 2 * len(can_tell.intersection(lost)) <= len(can_tell)
         suspects = suspects_of(identified, flights, setup.limits, workers) if options.causes else ()
         return Answer(identified, followed, follows, causes, unmoved, missed, believed, lost, suspects)
 
@@ -139,6 +140,20 @@ class Answer:
         model, noise = self.identified.members[0], self.identified.noise(setup.signals)
         unit = Unit(setup.seed).part(len(flights), 2)
         return misses_of(model, flights, noise, self.causes, unit, setup.limits, workers, self.suspects)
+
+
+def _can_tell(flights: Sequence[Experiment], disturbed: bool) -> set[int]:
+    """Places of the flights that tell whether a law is followed.
+
+    What disturbs takes a replay without a controller far from the right law, too, if what is replayed is unstable. So a
+    replay tells nothing beside a flight of a test, under whose controller a right law follows.
+
+    Args:
+        flights: that a law was learnt from.
+        disturbed: whether disturbances that last explain what it misses.
+    """
+    every, tested = range(len(flights)), {place for place, run in enumerate(flights) if run.test is not None}
+    return tested if tested and disturbed else set(every)
 
 
 def _lost(

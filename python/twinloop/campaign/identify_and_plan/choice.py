@@ -131,6 +131,8 @@ class Choice:
         better = standing.best_flown(self.book)
         if better is None or better.number == flown.number:
             return ""
+        if better.genes.tobytes() == flown.genes.tobytes():
+            return f" Test {better.number} flew the same gains, and was measured better."
         if better.excitation is None and flown.excitation is None:
             return f" Test {better.number} was measured better; what the twin predicts speaks for these."
         return f" Test {better.number} was measured better; without excitation these are better."

@@ -22,7 +22,7 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
-from twinloop.faces.cautions import advised_to_stop, not_reliable, serious_of
+from twinloop.faces.cautions import advised_to_stop, not_reliable, serious_of, thin_margins
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.dashboard.desk import Desk, to_be_learnt
 from twinloop.faces.dashboard.fence import App, Fence
@@ -276,9 +276,20 @@ class Pages:
         waiting, stored_as = to_be_flown(campaign), self.desk.stored_as(name)
         file = columns_file(stored_as, test).name
         advice, flown, chosen = advised_to_stop(campaign), campaign.runs > 0, is_chosen(campaign, test)
-        called = fields_beside(self.desk.store)
+        called, margins = fields_beside(self.desk.store), thin_margins(campaign, test)
         return sheet(
-            stored_as, test, predicted, file, campaign.setup, against, waiting, advice, flown, chosen, called
+            stored_as,
+            test,
+            predicted,
+            file,
+            campaign.setup,
+            against,
+            waiting,
+            advice,
+            flown,
+            chosen,
+            called,
+            margins,
         )
 
     def _columns(self, name: str, number: int) -> tuple[str, str]:
