@@ -11,7 +11,7 @@ import twinloop as tl
 from oracles import same_bits
 from strategies import program_text
 from twinloop import _core
-from twinloop.signals import ordered
+from twinloop.signals import TURNS, ordered
 
 COMMAND = tl.Command("u", "N", (-4.0, 2.0))
 finite = st.floats(-50.0, 50.0)
@@ -208,3 +208,21 @@ def test_an_angle_that_a_body_turns_has_no_derivative_besides_and_it_is_said_whe
     states = [state(name, {"p": "roll"}.get(name)) for name in names]
     with pytest.raises(tl.InvalidInput, match="remove `derivative_of` from 'p'"):
         tl.Signals(states, [COMMAND], 0.1, kinematics=tl.RigidBody(names[:3], names[3:]))
+
+
+@pytest.mark.parametrize("unit", ["deg", "°", "degree", "degrees"])
+def test_degrees_are_degrees_however_they_are_written(unit):
+    heading = tl.State("heading", unit, 180.0)
+    assert TURNS[unit] == 360.0
+    with pytest.raises(tl.InvalidInput, match="declare both in the unit that the log has"):
+        tl.Signals(
+            [heading, tl.State("rate", "rad/s", 1.0, derivative_of="heading")],
+            [tl.Command("rudder", "1", (-1.0, 1.0))],
+            0.1,
+        )
+
+
+@pytest.mark.parametrize("unit", ["rad\n", "m\u202es", "\x1b[2J"])
+def test_a_unit_that_cannot_be_printed_is_refused(unit):
+    with pytest.raises(tl.InvalidInput, match="letters and signs that can be printed"):
+        tl.State("angle", unit, 1.0)

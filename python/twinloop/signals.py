@@ -19,7 +19,9 @@ from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
 
 Bounds = tuple[float, float]
-TURNS = {"rad": 2.0 * math.pi, "deg": 360.0}
+DEGREES = ("deg", "°", "degree", "degrees")
+"""Units of angles of which a turn is 360."""
+TURNS = {"rad": 2.0 * math.pi, **dict.fromkeys(DEGREES, 360.0)}
 """A whole turn in the units of angles."""
 WHOLE_TURN = 0.99
 """Share of its period that the envelope of an angle spans if it bounds nothing: -3.14 to 3.14 is a whole turn."""
@@ -297,7 +299,7 @@ class Signals(Value, Recorded, kind="signals"):
     def _check_unit(self, rate: str, angle: str) -> None:
         """Refuses a rate in one unit of angles that is the derivative of an angle in the other."""
         units = {state.name: state.unit for state in self.states}
-        for one, other in (("deg", "rad"), ("rad", "deg")):
+        for one, other in (pair for each in DEGREES for pair in ((each, "rad"), ("rad", each))):
             if units[angle] == one and units[rate].startswith(f"{other}/s"):
                 raise InvalidInput(
                     f"Signals: expected {rate!r} in {one}/s, the derivative of {angle!r} in {one}, found it in"
@@ -478,6 +480,10 @@ def _check_words(kind: str, name: object, unit: object) -> None:
             "it becomes a symbol in equations, so rename it."
         )
     text(f"{kind} {name!r}, unit", unit)
+    if not str(unit).isprintable():
+        raise InvalidInput(
+            f"{kind} {name!r}, unit: expected letters and signs that can be printed, found {unit!r}; write it again."
+        )
 
 
 def _a_second(unit: str) -> str:

@@ -4,7 +4,9 @@ import pytest
 
 from conftest import PENDULUM_GAINS
 from lives import new
-from twinloop.faces.columns import columns_file
+from twinloop.errors import InvalidInput
+from twinloop.faces.columns import columns, columns_file, refuse_other
+from twinloop.logs import write_columns
 from twinloop.store import StoredAs
 
 NAMES = [
@@ -55,3 +57,14 @@ def test_no_two_campaigns_have_one_file_in_a_folder_without_upper_case_either(te
     files = {named(name, test).name.lower() for name in NAMES}
     assert len(files) == len(NAMES)
     assert columns_file(StoredAs("runs/rig.db"), test).name not in files
+
+
+def test_a_flight_under_the_name_of_a_tests_file_stays_and_columns_are_replaced(test, tmp_path):
+    path = tmp_path / "rig-test-1.csv"
+    refuse_other(path)
+    write_columns(path, columns(test, None))
+    assert path.read_text().splitlines()[1] == "0.0,0.0"  # nothing is added, and the column is there
+    refuse_other(path)
+    path.write_text("t,angle,rate,torque\n0,0,0,0\n")
+    with pytest.raises(InvalidInput, match="found t, angle, rate …; the test is planned"):
+        refuse_other(path)

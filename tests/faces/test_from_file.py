@@ -74,6 +74,17 @@ def flights(store):
     return [run.trajectory.states for run in campaign.experiments]
 
 
+@pytest.mark.parametrize(
+    ("use", "arguments"),
+    [("os:system", {"command": "echo > made"}), ("subprocess:run", {"args": ["touch", "made"]})],
+)
+def test_what_belongs_to_python_itself_is_not_called_as_a_system(folder, use, arguments):
+    written(folder, PENDULUM, section(use, **arguments))
+    refused = run("run", "rig.toml")
+    assert refused.exit_code != 0 and "one of Python's own modules" in refused.output
+    assert not (folder / "made").exists()
+
+
 def test_a_system_of_ones_own_is_flown_and_resumed_with_the_same_bits(folder):
     written(folder, PENDULUM, section("rig:rig", "timeout = 60.0", noise=0.01, seed=1))
     done = run("run", "rig.toml", "--experiments", "3", "--threads", "1")

@@ -317,6 +317,22 @@ def test_empty_cells_of_a_historian_are_counted_and_a_slow_period_is_told_in_sec
     assert said.exit_code == 0 and "lacks single readings, 2 of heat: each is taken half-way" in said.stdout
 
 
+def test_a_quote_that_nobody_closes_takes_no_rows_away(checked, tmp_path):
+    assert checked().exit_code == 0
+    head, *rows = (tmp_path / "flight.csv").read_text().splitlines()
+    rows = [row + (',"motor hot' if at == 50 else ",") for at, row in enumerate(rows)]
+    (tmp_path / "flight.csv").write_text("\n".join([f"{head},note", *rows]))
+    refused = invoke("check", str(tmp_path / "flight.csv"), str(tmp_path / "rig.toml"))
+    assert refused.exit_code != 0 and "unexpected end of data" in refused.output
+
+
+def test_a_part_of_a_log_is_not_written_over_it(checked, tmp_path):
+    log = tmp_path / "flight.csv"
+    refused = checked(lambda log: None, "--from", "0", "--to", "1", "-o", str(log))
+    assert refused.exit_code != 0 and "expected another file than the log" in refused.output
+    assert len(log.read_text().splitlines()) == 1 + 121
+
+
 def test_of_a_rate_that_no_sensor_reads_nothing_is_said_that_its_state_explains(tmp_path):
     (tmp_path / "rig.toml").write_text(
         'dt = 0.1\nlags = 1\n[states.x]\nunit = "m"\nscale = 1.0\n[commands.u]\nunit = "N"\nbounds = [-1.0, 1.0]\n'

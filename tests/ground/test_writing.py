@@ -83,6 +83,17 @@ def test_contents_are_on_the_disk_before_they_get_their_name_and_the_name_is_beh
     assert done == ["file", "name", "folder"]
 
 
+def test_a_database_is_never_replaced_not_even_behind_a_link(tmp_path):
+    store = tmp_path / "rig.db"
+    store.write_bytes(b"SQLite format 3\0" + bytes(100))
+    link = tmp_path / "report.html"
+    link.symlink_to(store.name)
+    for path in (store, link):
+        with pytest.raises(tl.InvalidInput, match="expected no database there"):
+            write_whole(path, "<html>")
+    assert store.stat().st_size == 116
+
+
 def test_a_folder_that_cannot_be_put_on_the_disk_is_no_failure(tmp_path, monkeypatch):
     fsync = os.fsync
 

@@ -550,6 +550,31 @@ def test_the_death_of_a_writer_lets_the_next_one_in(path):
     assert not path.with_name("hover.db-1.lock").exists()
 
 
+def test_a_lock_that_is_a_link_is_refused_and_leaves_what_it_leads_to(path):
+    stored(path).close()
+    other = path.with_name("other.txt")
+    other.write_text("mine")
+    path.with_name("hover.db-1.lock").symlink_to(other.name)
+    with pytest.raises(tl.StoreFailure, match="found a link to another one"):
+        tl.Campaign.load(path)
+    assert other.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        "create trigger forget after insert on experiments begin delete from experiments; end",
+        "create view tests_again as select * from tests",
+    ],
+)
+def test_a_store_that_would_change_what_is_written_is_refused(path, made):
+    stored(path).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute(made)
+    with pytest.raises(tl.InvalidInput, match=r"expected tables alone, found (forget|tests_again)"):
+        tl.Campaign.load(path)
+
+
 # Failures
 
 

@@ -8,6 +8,11 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+from twinloop.errors import InvalidInput
+
+STORE = b"SQLite format 3\0"
+"""How a database of SQLite begins."""
+
 
 def write_whole(path: Path, contents: str | bytes) -> None:
     """Writes a file; what was there stays until all of the new one is on the disk.
@@ -20,6 +25,8 @@ def write_whole(path: Path, contents: str | bytes) -> None:
         OSError: it cannot be written; what was there is still there.
     """
     content = contents.encode("utf-8") if isinstance(contents, str) else contents
+    if _is_store(path) and not content.startswith(STORE):
+        raise InvalidInput(f"File {path}: expected no database there, found one; name another file.")
     try:
         if path.exists() and not path.is_file():  # a device or a pipe, which must not become a file
             path.write_bytes(content)
@@ -28,6 +35,14 @@ def write_whole(path: Path, contents: str | bytes) -> None:
     except OSError as refusal:
         # Of a full disk the system names no file, of a draft one that nobody knows.
         raise OSError(refusal.errno, refusal.strerror, str(path)) from refusal
+
+
+def _is_store(path: Path) -> bool:
+    """Whether there is a database, which has flights in it."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(STORE)) == STORE
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -17,7 +17,7 @@ from twinloop.campaign.persistence import stored_as
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.answering import answer, json_option, name_option, next_command, threads_option
 from twinloop.faces.cautions import advised_to_stop, serious_of, thin_margins
-from twinloop.faces.columns import columns, columns_file
+from twinloop.faces.columns import columns, columns_file, refuse_other
 from twinloop.faces.files import check_writable
 from twinloop.faces.first_test import first_test
 from twinloop.faces.from_file import file_beside
@@ -63,7 +63,10 @@ def new(file: Path, as_json: bool) -> None:
 @click.option("--last", is_flag=True, help="The last test of the campaign: fly the best gains found so far.")
 @click.option("--again", is_flag=True, help="Plan another test although one is still to be flown.")
 @click.option(
-    "--batch", type=int, metavar="N", help="Plan N alternative tests, the best first; fly them in any order."
+    "--batch",
+    type=click.IntRange(1, 100),
+    metavar="N",
+    help="Plan N alternative tests, the best first; fly them in any order.",
 )
 @name_option
 @threads_option
@@ -137,6 +140,7 @@ def _shown(campaign: Campaign, test: Test, advice: str) -> tuple[str, dict[str, 
     place, predicted = stored_as(campaign), foreseen(campaign, test)
     assert place is not None  # it was opened in a store
     file = columns_file(place, test)
+    refuse_other(file)
     write_columns(file, columns(test, predicted))
     against_twin = serious_of(latest_lesson(campaign))
     flown, chosen = campaign.runs > 0, is_chosen(campaign, test)

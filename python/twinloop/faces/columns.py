@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
+from twinloop.errors import InvalidInput
 from twinloop.faces.ends import varying
 from twinloop.faces.from_file import file_beside
 from twinloop.logs import TIME
@@ -16,6 +17,10 @@ from twinloop.store import StoredAs
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
+OURS = ("excitation_", "target_", "predicted_", "low_", "high_")
+"""How columns of a test begin, beside its times."""
+HEAD = 100_000
+"""Characters that are read of a file's names of columns."""
 PLAIN = re.compile("[a-z0-9][a-z0-9_-]{0,59}")
 """Names that any folder takes as they are, and keeps apart."""
 
@@ -39,6 +44,26 @@ def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
             if predicted.band is not None:
                 columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
     return columns
+
+
+def refuse_other(path: Path) -> None:
+    """Refuses to write a test's columns over another file, such as a flight that was recorded under its name.
+
+    Args:
+        path: of the file that will be written.
+
+    Raises:
+        InvalidInput: a file with other columns.
+    """
+    if not path.is_file():
+        return
+    with path.open(encoding="utf-8", errors="replace") as file:
+        head = file.readline(HEAD).strip().split(",")
+    if not all(name == TIME or name.startswith(OURS) for name in head):
+        raise InvalidInput(
+            f"File {path}: expected none, or the columns of this test, found {', '.join(head[:3])} …; the test is"
+            " planned: rename the file, then ask again."
+        )
 
 
 def columns_file(stored_as: StoredAs, test: Test) -> Path:

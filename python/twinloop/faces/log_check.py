@@ -62,6 +62,11 @@ def check(
     else:
         click.echo(_text(log, found), nl=False)
     if output is not None:
+        if output.exists() and output.samefile(log):
+            raise InvalidInput(
+                f"twinloop check, --output: expected another file than the log {log}, which stays as it was recorded,"
+                " found the same; name another."
+            )
         columns = dict(zip(names_of(states, signals), states.T, strict=True))
         columns |= dict(zip(signals.command_names, commands.T, strict=True))
         write_columns(output, {TIME: t, **columns})

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 """Share of a period by which even times may be off it."""
 EARLY = 0.05
-"""Periods by which the last row may come early: what it reads is then read at its time."""
+"""Periods by which the last row may come early: states go on until its time as the last two rows say."""
 BETWEEN = 2.5
 """Periods by which two readings may be apart: one is missing, and both come at their own time."""
 

@@ -88,10 +88,7 @@ def remarks_on(columns: Mapping[str, str], head: Sequence[str], units: Mapping[s
         units: of the signals that are read, by name.
     """
     absent = {name: column for name, column in columns.items() if column.strip() not in head}
-    own = [name for name in absent if name in units]
-    # Where several are called by their own names, and none as was said, the log was converted to these names.
-    converted = len(own) > 1 and own == [name for name in columns if name in units]
-    if own and not converted:
+    if own := [name for name in absent if name in units]:
         yield note(
             "column",
             f"No column is called {listed([repr(absent[name]) for name in own])}: {listed(own)}"

@@ -74,13 +74,16 @@ def interpolated(samples: Samples, state: State, times: Floats) -> Floats:
     """Values between samples; of an angle that wraps between two of them by the short way, so that it jumps nowhere.
 
     Args:
-        samples: of a state.
+        samples: of a state, at least two.
         state: which.
-        times: wanted (n,), s.
+        times: wanted (n,), s; what lies a little after the last sample goes on as the last two say.
     """
     turn = state.period or TURNS.get(state.unit)
     values = samples.values if turn is None else without_jumps(samples.values, turn)
-    return np.asarray(np.interp(times, samples.times, values))
+    found = np.interp(times, samples.times, values)
+    after = np.maximum(0.0, times - samples.times[-1])
+    slope = (values[-1] - values[-2]) / (samples.times[-1] - samples.times[-2])
+    return np.asarray(found + slope * after)
 
 
 def held(samples: Samples, times: Floats) -> Floats:

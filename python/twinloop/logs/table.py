@@ -52,7 +52,8 @@ def rows_of(path: Path, called: str) -> Iterator[Row]:
             file.seek(0)
             # Not `splitlines`, which ends a row at any form feed or vertical tab in a note.
             lines = _Lines(file, called)
-            reader = csv.reader(lines, delimiter=delimiter)
+            # Strict: a quote that nobody closes would take all that follows into its cell.
+            reader = csv.reader(lines, delimiter=delimiter, strict=True)
             before: tuple[int, list[str]] | None = None
             for row in reader:
                 if not any(cell.strip() for cell in row):

@@ -282,6 +282,15 @@ def _bring_up_to_date(store: Store, create: bool) -> None:
     from twinloop.store.schema import REVISION
 
     with store.engine.connect() as connection:
+        if store.path is not None:
+            others = connection.execute(
+                text("select name from sqlite_master where type in ('trigger', 'view')")
+            )
+            if foreign := sorted(others.scalars()):
+                raise InvalidInput(
+                    f"Store {store.name}: expected tables alone, found {', '.join(foreign[:5])}; a trigger or a view"
+                    " would change what is written, and Twinloop makes none: use a store that nobody has changed."
+                )
         tables = set(inspect(connection).get_table_names())
         ours = {"alembic_version", "campaigns", "experiments"} <= tables
         found = connection.execute(text("select version_num from alembic_version")).scalar() if ours else None

@@ -35,7 +35,7 @@ class FileLock:
     def __init__(self, path: Path, what: str) -> None:
         self.path = path
         while True:
-            self._file = path.open("a+", encoding="utf-8")
+            self._file = _opened(path)
             if not _locked(self._file):
                 self._file.seek(0)
                 holder = self._file.read(100).strip() or "another one"
@@ -46,7 +46,8 @@ class FileLock:
                 if _is(self._file, path):
                     break
             self._file.close()
-        self._file.truncate(0)
+        self._file.seek(0)
+        self._file.truncate()
         self._file.write(f"process {os.getpid()}")
         self._file.flush()
 
@@ -104,8 +105,21 @@ def taken(what: str, holder: str) -> StoreFailure:
     )
 
 
+def _opened(path: Path) -> IO[str]:
+    """A file of a lock, made where there is none; no link, which would lead to a file of somebody's own."""
+    try:
+        found = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    except OSError as reason:
+        if not path.is_symlink():
+            raise
+        raise StoreFailure(
+            f"Store: expected {path} to be a file of Twinloop's own, found a link to another one; remove the link."
+        ) from reason
+    return os.fdopen(found, "r+", encoding="utf-8")
+
+
 def _is(file: IO[str], path: Path) -> bool:
-    found, there = os.fstat(file.fileno()), path.stat()
+    found, there = os.fstat(file.fileno()), path.lstat()
     return (found.st_dev, found.st_ino) == (there.st_dev, there.st_ino)
 
 

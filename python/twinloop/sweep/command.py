@@ -59,7 +59,7 @@ def sweep(
     """
     jobs = crossed(
         systems,
-        list(seeds_of(seeds)),
+        seeds_of(seeds),
         presets=[name.strip() for name in presets.split(",")],
         options=_varied(vary),
         experiments=experiments,

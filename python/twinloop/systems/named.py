@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -50,8 +50,10 @@ def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | 
     """
     if not isinstance(name, str) or (name not in NAMED and ":" not in name):
         raise unknown("system", name, [*NAMED, "module:object"])
-    with _importable(folder):
+    with nullcontext() if name in NAMED else _importable(folder):
         found = NAMED[name] if name in NAMED else imported(name, BESIDE)
+        if name not in NAMED:
+            _refuse_what_makes_no_system(name, found)
         system = _made(name, found, dict(arguments), signals, folder)
     own = getattr(system, "signals", None)
     if not isinstance(own, Signals) or not callable(getattr(system, "run", None)):
@@ -96,6 +98,16 @@ def imported(name: str, place: str) -> Any:
             f"System {name!r}: expected a module that can be imported, found {raised(reason)}; correct it."
         ) from reason
     return found
+
+
+def _refuse_what_makes_no_system(name: str, found: object) -> None:
+    """Refuses to call what belongs to Python itself: with its arguments a file alone could run any program."""
+    of = name.partition(":")[0].partition(".")[0], str(getattr(found, "__module__", "")).partition(".")[0]
+    if inspect.isbuiltin(found) or not sys.stdlib_module_names.isdisjoint(of):
+        raise InvalidInput(
+            f"System {name!r}: expected a system, or a class or function of yours that makes one, found one of Python's"
+            " own modules; name another."
+        )
 
 
 def _made(name: str, found: Any, arguments: dict[str, Any], signals: Signals | None, folder: Path) -> Any:

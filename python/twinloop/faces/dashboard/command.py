@@ -76,6 +76,8 @@ def prepared(
         raise InvalidInput(
             f"--token: expected at least {SHORTEST} characters, found {len(token)}; make it longer."
         )
+    if not host.strip():
+        raise InvalidInput("--host: expected an address of this machine, found none; such as 127.0.0.1.")
     here = host in ("127.0.0.1", "localhost", "::1")
     secret = token or ("" if here else secrets.token_urlsafe(24))
     desk = Desk(store, threads)

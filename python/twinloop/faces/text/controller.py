@@ -62,7 +62,7 @@ def controller_text(result: Mapping[str, Any]) -> str:
     qualities = [["this controller", best["predicted"], best["spread"], best["measured"]]]
     if first is not None:
         qualities.append(["first controller", first["predicted"], None, first["measured"]])
-    gently = next((run["excited"] for run in result["experiments"] if run["gains"] is not None), False)
+    gently = next((run["excited"] for run in result["experiments"] if run["test"] is not None), False)
     excited = "\nThe first controller was excited when it was flown." if gently else ""
     title = "CONTROLLER, NOT TO BE FLOWN" if _is_refused(result) else "CONTROLLER TO FLY"
     return "\n".join(

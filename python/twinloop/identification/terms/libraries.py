@@ -7,7 +7,7 @@ from itertools import combinations, combinations_with_replacement
 
 from twinloop.identification.terms.attitude import attitude
 from twinloop.identification.terms.pool import Pool
-from twinloop.signals import Signals, State, rates
+from twinloop.signals import DEGREES, Signals, State, rates
 
 Terms = list[int]
 FRICTION = 30.0
@@ -16,8 +16,6 @@ LIKELIER = 1.0
 """Nats by which |x| x of a speed or a command is shorter than its square."""
 PER_TIME = ("/s", "/min", "/h", "rpm")
 """Ends of units of what moves or flows."""
-DEGREES = ("deg", "°", "degree", "degrees")
-"""Units of angles of which a turn is 360."""
 CUBIC_INPUTS = 13
 """States and commands, together, of which there are products of three: 455."""
 
