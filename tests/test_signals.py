@@ -226,3 +226,12 @@ def test_degrees_are_degrees_however_they_are_written(unit):
 def test_a_unit_that_cannot_be_printed_is_refused(unit):
     with pytest.raises(tl.InvalidInput, match="letters and signs that can be printed"):
         tl.State("angle", unit, 1.0)
+
+
+def test_names_that_python_takes_for_one_are_refused():
+    with pytest.raises(tl.InvalidInput, match="expected names that differ, found 'fi' twice"):
+        tl.Signals(
+            [tl.State("\N{LATIN SMALL LIGATURE FI}", "1", 1.0), tl.State("fi", "1", 1.0)],
+            [tl.Command("u", "1", (-1.0, 1.0))],
+            0.1,
+        )

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass
 from functools import cached_property
 from keyword import iskeyword
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -215,7 +216,8 @@ class Signals(Value, Recorded, kind="signals"):
             self._check_names()
 
     def _check_names(self) -> None:
-        names = self.state_names + self.command_names
+        # As Python reads them, for which a ligature is its letters.
+        names = [normalize("NFKC", name) for name in self.state_names + self.command_names]
         for name in names:
             if names.count(name) > 1:
                 raise InvalidInput(

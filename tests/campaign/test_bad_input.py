@@ -224,6 +224,7 @@ CAMPAIGNS = {
     "a duration that is NaN": {"duration": np.nan},
     "a duration of one period": {"duration": 0.05},
     "a duration between two periods": {"duration": 1.03},
+    "a duration of more periods than a record holds": {"duration": 1e300},
     "a preset that there is none of": {"preset": "fast"},
     "an option that there is none of": {"options": {"generations": 5}},
     "an operation that there is none of": {"options": {"operations": ["+", "pow"]}},

@@ -76,13 +76,27 @@ def flights(store):
 
 @pytest.mark.parametrize(
     ("use", "arguments"),
-    [("os:system", {"command": "echo > made"}), ("subprocess:run", {"args": ["touch", "made"]})],
+    [
+        ("os:system", {"command": "echo > made"}),
+        ("subprocess:run", {"args": ["touch", "made"]}),
+        ("tl_beside:os.system", {"command": "echo > made"}),
+    ],
 )
 def test_what_belongs_to_python_itself_is_not_called_as_a_system(folder, use, arguments):
+    (folder / "tl_beside.py").write_text("import os\n", encoding="utf-8")
     written(folder, PENDULUM, section(use, **arguments))
     refused = run("run", "rig.toml")
     assert refused.exit_code != 0 and "one of Python's own modules" in refused.output
     assert not (folder / "made").exists()
+
+
+def test_what_makes_a_system_may_be_partly_called_already(folder):
+    (folder / "tl_partly.py").write_text(
+        "import rig\nfrom functools import partial\nmake = partial(rig.rig, noise=0.01)\n"
+    )
+    written(folder, PENDULUM, section("tl_partly:make", seed=1))
+    done = run("run", "rig.toml", "--experiments", "1", "--threads", "1")
+    assert done.exit_code == 0, done.output
 
 
 def test_a_system_of_ones_own_is_flown_and_resumed_with_the_same_bits(folder):

@@ -425,7 +425,13 @@ def refuse_arguments(where: str, found: Mapping[str, object], known: Sequence[st
 
 
 def _steps(duration: float, dt: float) -> int:
-    steps = round(duration / dt)
+    periods = duration / dt
+    if not periods <= MOST_STEPS:
+        raise InvalidInput(
+            f"Campaign, duration: expected at most {MOST_STEPS} periods of {dt:g} s, found {duration:g} s; choose a"
+            " longer period or a shorter flight."
+        )
+    steps = round(periods)
     if abs(steps * dt - duration) > 1e-6 * duration or steps < 2:
         raise InvalidInput(
             f"Campaign, duration: expected a whole number of periods of {dt:g} s, at least 2, "

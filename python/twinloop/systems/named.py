@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | 
     """
     if not isinstance(name, str) or (name not in NAMED and ":" not in name):
         raise unknown("system", name, [*NAMED, "module:object"])
-    with nullcontext() if name in NAMED else _importable(folder):
+    with _importable(folder, first=name not in NAMED):
         found = NAMED[name] if name in NAMED else imported(name, BESIDE)
         if name not in NAMED:
             _refuse_what_makes_no_system(name, found)
@@ -102,7 +102,10 @@ def imported(name: str, place: str) -> Any:
 
 def _refuse_what_makes_no_system(name: str, found: object) -> None:
     """Refuses to call what belongs to Python itself: with its arguments a file alone could run any program."""
-    of = name.partition(":")[0].partition(".")[0], str(getattr(found, "__module__", "")).partition(".")[0]
+    written_in = (
+        str(getattr(found, "__module__", "")) if inspect.isroutine(found) or inspect.isclass(found) else ""
+    )
+    of = [module.partition(".")[0] for module in (name.partition(":")[0], written_in)]
     if inspect.isbuiltin(found) or not sys.stdlib_module_names.isdisjoint(of):
         raise InvalidInput(
             f"System {name!r}: expected a system, or a class or function of yours that makes one, found one of Python's"
@@ -156,10 +159,11 @@ def _made(name: str, found: Any, arguments: dict[str, Any], signals: Signals | N
 
 
 @contextmanager
-def _importable(folder: Path) -> Iterator[None]:
-    """Modules of a folder can be imported meanwhile."""
-    sys.path.insert(0, str(folder.resolve()))
+def _importable(folder: Path, first: bool) -> Iterator[None]:
+    """Modules of a folder can be imported meanwhile; before all others where one of them is named, else behind them."""
+    place = str(folder.resolve())
+    sys.path.insert(0 if first else len(sys.path), place)
     try:
         yield
     finally:
-        sys.path.remove(str(folder.resolve()))
+        sys.path.remove(place)
