@@ -759,10 +759,25 @@ def test_wrong_arguments_are_refused(campaign):
         with pytest.raises(tl.InvalidInput):
             campaign.guard(test, **wrong)
     guard = campaign.guard(test, clock=None)
-    for state, target in (([0.0], [0.0, 0.0]), ([0.0, 0.0], [np.nan, 0.0])):
+    for state, target in (
+        ([0.0], [0.0, 0.0]),
+        ([0.0, 0.0], [0.0]),
+        ([0.0, 0.0], [np.nan]),
+        ([0.0, 0.0], "far"),
+    ):
         with pytest.raises(tl.InvalidInput):
             guard.command(state, target)
     assert guard.period == 0
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_target_that_is_not_finite_trips_and_the_fallback_goes_on_to_that_of_the_test(campaign, wrong):
+    test = campaign.test(GOOD)
+    guard, readings = campaign.guard(test, clock=None), rig().run(test).states
+    for k in range(6):
+        found = guard.command(readings[k], test.target(k) if k < 3 else [wrong, 0.0])
+        assert np.isfinite(found).all() and guard.tripped == (k >= 3)
+    assert guard.tripped_at == 3 and guard.reason.endswith("the target is not finite")
 
 
 # Systems

@@ -151,7 +151,7 @@ class Guard:
         Args:
             state: reading (n_x,), SI units, radians; NaN for a missing value. Or of those states alone that are
                 measured.
-            target: target state (n_x,), the same units.
+            target: target state (n_x,), the same units; one that is not finite trips, and that of the test counts.
 
         Returns:
             Command (n_u,), within its bounds: the test's, or the fallback's once the guard has tripped.
@@ -172,7 +172,7 @@ class Guard:
                 f"Guard.command, state: expected {self.signals.n_x} numbers{or_measured(self.signals)}, found shape"
                 f" {reading.shape}."
             )
-        goal = completed_state("Guard.command, target", target, self.signals)
+        goal = self._goal(target)
         own = None
         if not self.tripped:
             with self._tripping("a check"):
@@ -344,6 +344,17 @@ class Guard:
             yield
         except Exception as failure:
             self._trip(f"{what} failed: {type(failure).__name__}: {failure}")
+
+    def _goal(self, target: ArrayLike) -> Floats:
+        """The target of a period; that of the test where what computes it in flight has failed."""
+        values = np.asarray(target)
+        if values.dtype.kind == "f" and values.ndim == 1 and not np.isfinite(values).all():
+            if not self.tripped:
+                self._trip("the target is not finite")
+            target = np.where(np.isfinite(values), values, 0.0)
+            completed_state("Guard.command, target", target, self.signals)  # refuses another number of them
+            target = self.test.target(min(self.period, self.test.steps))
+        return completed_state("Guard.command, target", target, self.signals)
 
     def _trip(self, why: str) -> None:
         self.tripped, self.tripped_at = True, self.period
