@@ -482,10 +482,6 @@ def _check_words(kind: str, name: object, unit: object) -> None:
             "it becomes a symbol in equations, so rename it."
         )
     text(f"{kind} {name!r}, unit", unit)
-    if not str(unit).isprintable():
-        raise InvalidInput(
-            f"{kind} {name!r}, unit: expected letters and signs that can be printed, found {unit!r}; write it again."
-        )
 
 
 def _a_second(unit: str) -> str:

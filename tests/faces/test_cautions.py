@@ -13,7 +13,7 @@ from lives import SMALL
 from twinloop.campaign.assessment import Advice
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.faces.cautions import advised_to_stop, leaving
-from twinloop.faces.sheet import facts, sheet
+from twinloop.faces.sheet import _table, facts, sheet
 from twinloop.remarks import serious
 from twinloop.store import StoredAs
 
@@ -118,3 +118,8 @@ def test_a_sheet_says_what_is_scaled_and_what_a_program_does_that_cannot(campaig
     assert "rig-test-0.csv has the rows to be scaled." in text and "hold_back = false under [options]" in text
     quiet = replace(campaign.test(PENDULUM_GAINS), excitation=None, hold_back=None)
     assert "hold_back" not in sheet(StoredAs("rig.db"), quiet, None, "rig-test-0.csv", campaign.setup)
+
+
+def test_a_line_break_in_a_unit_makes_no_row_of_its_own():
+    one, other = (_table(["gain", "unit"], [["kp", unit]]) for unit in ("rad\nkd  9 \u202e", "rad kd 9"))
+    assert one == other and one.count("\n") == 2

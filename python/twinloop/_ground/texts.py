@@ -78,7 +78,7 @@ def in_unit(text: str, unit: str) -> str:
         text: of the number.
         unit: of it; "" and "1" are none.
     """
-    return text if unit in ("", "1") else f"{text} {unit}"
+    return text if unit in ("", "1") else f"{text} {one_line(unit)}"
 
 
 def two_digits(value: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.arrays import Floats
-from twinloop._ground.texts import in_unit, two_digits
+from twinloop._ground.texts import in_unit, one_line, two_digits
 from twinloop.campaign.data.begun import allowed_off
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
@@ -35,7 +35,7 @@ def _ends(test: Test, file: str) -> list[str]:
     found = ends(test)
     leads = ["target"] if len(found[0].targets) == 1 else ["first target", "last target"]
     rows = [[each.state.name, each.start, *each.targets, each.state.unit] for each in found]
-    lines = [table(["state", "start", *leads, "unit"], rows)]
+    lines = [_table(["state", "start", *leads, "unit"], rows)]
     if varies := varying_words(test, file):
         lines += ["", varies]
     return lines
@@ -61,7 +61,7 @@ def _expected(test: Test, predicted: Trajectory | None) -> str:
             cells.append(middle + ["diverged"] * (test.steps + 1 - len(middle)))
     chosen = sorted({round(k) for k in np.linspace(0, test.steps, min(test.steps, ROWS) + 1).tolist()})
     rows = [[column[k] if k < len(column) else "" for column in cells] for k in chosen]
-    return table(heads, rows)
+    return _table(heads, rows)
 
 
 def reason(test: Test, flown: bool, chosen: bool = False) -> str:
@@ -232,6 +232,12 @@ def _begin_within(test: Test) -> str:
     return f"Begin within {ranges}: a flight from elsewhere is learnt from, but its quality is not compared."
 
 
+def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A table in which no line break of a text, such as a unit of somebody's, looks like a row of its own."""
+    lines = [[one_line(each) if isinstance(each, str) else each for each in row] for row in rows]
+    return table([one_line(head) for head in heads], lines)
+
+
 def _held_back(test: Test, file: str) -> list[str]:
     """How a person's own program holds the excitation back; nothing where nothing does."""
     ranges = hold_back_ranges(test)
@@ -244,7 +250,7 @@ def _held_back(test: Test, file: str) -> list[str]:
         f"{hold_back_words(test)} {file} has the rows to be scaled. For a program that cannot do this, set hold_back ="
         " false under [options] and begin a new campaign: then the excitation stays small.",
         "",
-        table(["state", "inner range", "outer range", "unit"], rows),
+        _table(["state", "inner range", "outer range", "unit"], rows),
     ]
 
 
@@ -303,7 +309,7 @@ def sheet(
         f"TEST {test.number} of {stored_as.store}: {test.steps} periods of {signals.dt:g} s",
         *([advice] if advice else []),
         "",
-        table(["set this gain", "to", "unit"], gains),
+        _table(["set this gain", "to", "unit"], gains),
         "",
         *_ends(test, file),
         "",

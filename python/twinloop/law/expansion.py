@@ -113,7 +113,8 @@ class Expansion:
 
     def _factor(self, polynomial: Polynomial) -> Polynomial:
         """The same as one monomial."""
-        if len(polynomial) < 2:
+        # What is squared again and again would have as many factors as its power has.
+        if len(polynomial) < 2 and _degree(polynomial) <= HIGHEST:
             return polynomial
         return _alone(written(self.target, polynomial))
 

@@ -14,6 +14,8 @@ LONGEST_PART = 60
 """Characters above which a part of an expression gets a name."""
 WORTH_A_NAME = 24
 """Characters above which a part that is written several times gets a name."""
+ENDLESS = 2000
+"""Characters above which whatever is written several times gets a name."""
 EXACT = 17
 """Digits that give every bit of a constant back."""
 
@@ -187,7 +189,9 @@ class Writer:
     def _pays(self, number: int) -> bool:
         """Whether a part that is used twice gets a name, where short ones do not."""
         whole = self.expressions[number].operation not in ("*", "/", "+", "-", POWER)
-        return whole and len(self._texts[number].text) > self.dialect.worth
+        length = len(self._texts[number].text)
+        # What is squared again and again would double its text with each time.
+        return length > ENDLESS or (whole and length > self.dialect.worth)
 
     def _composed(self, number: int) -> Written:
         """A node as text of its operands."""
