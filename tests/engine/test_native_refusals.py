@@ -318,6 +318,11 @@ def calls(world):
         "Gram.with_prior": (w.gram.with_prior, {"precisions": np.ones(w.n_x)}),
         "Gram.with_rows": (w.gram.with_rows, {"rows": np.ones((2, w.n_x + 1))}),
         "Gram.solve": (w.gram.solve, {"subset": [w.n_x - 1], "ridge": 0.0}),
+        "Gram.least_squares": (w.gram.least_squares, {"subset": [w.n_x - 1], "ridge": 0.0}),
+        "behind_gap": (
+            _core.behind_gap,
+            {"mass": (0.03, 0.004, 0.003, 0.5), "rates": np.zeros((4, 3)), "dt": 0.01},
+        ),
         "most_likely_noises": (_core.most_likely_noises, {"problems": [problem]}),
         "search_subsets": (
             _core.search_subsets,

@@ -160,14 +160,17 @@ def test_gains_are_preferred_where_so_large_a_share_of_the_predictions_prefers_t
 
 def test_a_flight_that_was_measured_better_for_an_excitation_is_named():
     assert "measured better" not in chosen(1.1)[1]
-    excited = SimpleNamespace(number=3, excitation=np.ones((20, 2)))
+    others = FLOWN.genes + 0.1
+    excited = SimpleNamespace(number=3, genes=others, excitation=np.ones((20, 2)))
     answer, reason = chosen(1.1, best_measured=excited)
     assert answer == "flown" and "Test 3 was measured better; without excitation these are better." in reason
-    quiet = SimpleNamespace(number=3, excitation=None)
+    quiet = SimpleNamespace(number=3, genes=others, excitation=None)
     assert (
         "Test 3 was measured better; what the twin predicts speaks for these."
         in chosen(1.1, best_measured=quiet)[1]
     )
+    again = SimpleNamespace(number=3, genes=FLOWN.genes, excitation=np.ones((20, 2)))
+    assert "Test 3 flew the same gains, and was measured better." in chosen(1.1, best_measured=again)[1]
 
 
 def test_gains_that_have_not_flown_must_promise_more_than_was_measured_of_the_best_flown():
