@@ -59,6 +59,7 @@ __all__ = [
     "Variation",
     "Workers",
     "__version__",
+    "behind_gap",
     "best_tradeoff",
     "closed_loop",
     "command_effects",
