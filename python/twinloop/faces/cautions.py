@@ -105,7 +105,7 @@ def thin_margins(campaign: Campaign, test: Test) -> list[str]:
             found.append(f"the sensitivity of {least.loop} is {least.sensitivity:.3g}, above {FRAGILE:g}")
         if latest.delay < PERIODS * test.family.signals.dt:
             more = shown_time(latest.delay)
-            found.append(f"{more} more delay, less than a period, make the loop of {latest.loop} unstable")
+            found.append(f"{more} more delay, less than a period, makes the loop of {latest.loop} unstable")
     said = " and ".join(found)
     cut = "Cut the flight if it begins to oscillate; a certificate of these gains would be refused."
     return [f"On the twin {said}. {cut}"] if found else []

@@ -34,9 +34,7 @@ def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
     """
     signals = test.family.signals
     columns = {TIME: signals.dt * np.arange(test.steps + 1)}
-    # Also where nothing is added: a program that flew the tests before reads these columns.
-    added = np.zeros((test.steps, signals.n_u)) if test.excitation is None else test.excitation
-    columns |= {f"excitation_{n}": added[:, i] for i, n in enumerate(signals.command_names)}
+    columns |= excitation_columns(test)
     columns |= {f"target_{name}": rows for name, rows in varying(test).items()}
     if predicted is not None:
         for i, name in enumerate(signals.state_names):
@@ -44,6 +42,17 @@ def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
             if predicted.band is not None:
                 columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
     return columns
+
+
+def excitation_columns(test: Test) -> dict[str, np.ndarray]:
+    """What is added to each command, a row a period; also where it is nothing, for programs that read these columns.
+
+    Args:
+        test: to be flown.
+    """
+    signals = test.family.signals
+    added = np.zeros((test.steps, signals.n_u)) if test.excitation is None else test.excitation
+    return {f"excitation_{name}": added[:, i] for i, name in enumerate(signals.command_names)}
 
 
 def refuse_other(path: Path) -> None:

@@ -14,6 +14,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen
 from twinloop.errors import NotAvailable
 from twinloop.faces.answering import answer, json_option
+from twinloop.faces.columns import excitation_columns
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
 from twinloop.faces.telling import numbered, to_be_flown
 from twinloop.logs import TIME, write_columns
@@ -92,8 +93,7 @@ def _columns(campaign: Campaign, test: Test) -> dict[str, Floats]:
     """A row a period: what is added to the commands and, where there is a twin, what they will be on it."""
     signals = campaign.signals
     columns = {TIME: signals.dt * np.arange(test.steps, dtype=np.float64)}
-    added = np.zeros((test.steps, signals.n_u)) if test.excitation is None else test.excitation
-    columns |= {f"excitation_{name}": added[:, i] for i, name in enumerate(signals.command_names)}
+    columns |= excitation_columns(test)
     predicted = foreseen(campaign, test)
     if predicted is not None:
         columns |= {

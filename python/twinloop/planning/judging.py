@@ -166,6 +166,12 @@ class Judged:
         return worst
 
 
+def _only(test: Test) -> tuple[Floats, Floats | None, Ends]:
+    """Genes, excitation and ends of a test that is the only candidate."""
+    excitation = None if test.excitation is None else test.excitation[np.newaxis]
+    return test.genes[np.newaxis], excitation, (test.initial_state[np.newaxis], test.target_state[np.newaxis])
+
+
 def risk(usages: Floats) -> float:
     """Share of flights that leave the envelope, with half a flight added on either side: none is no certainty.
 
@@ -267,6 +273,11 @@ class Judge:
             members, genes, np.zeros(self.signals.n_x), 1, excitation, ends, hold_back=hold_back
         )
 
+    def quiet_test(self, members: Sequence[_core.Model], test: Test) -> Judged:
+        """Flies a test on members once, without noise, its excitation held back as it asks."""
+        genes, excitation, ends = _only(test)
+        return self.quiet(members, genes, excitation, ends, test.hold_back)
+
     def as_flown(
         self, members: Sequence[_core.Model], test: Test, sds: Floats, draws: int
     ) -> tuple[list[_core.Model], Judged]:
@@ -282,11 +293,11 @@ class Judge:
             Members that last, for one that diverges in a flight that went to its end says nothing of how good it was;
             and the qualities that records of its flights on them would give.
         """
-        genes = test.genes[np.newaxis]
-        excitation = None if test.excitation is None else test.excitation[np.newaxis]
-        quiet = self.quiet(members, genes, excitation, hold_back=test.hold_back)
-        lasting = list(compress(members, quiet.stable))
-        judged = self.judge(lasting, genes, sds, draws, excitation, measured=True, hold_back=test.hold_back)
+        genes, excitation, ends = _only(test)
+        lasting = list(compress(members, self.quiet_test(members, test).stable))
+        judged = self.judge(
+            lasting, genes, sds, draws, excitation, ends, measured=True, hold_back=test.hold_back
+        )
         return lasting, judged
 
     def judge_in_turn(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -201,20 +200,20 @@ class Planner(Judge):
             found: with an excitation.
             hold_back: what holds it back.
         """
-        genes, start, target = (
-            part[np.newaxis] for part in (found.genes, found.initial_state, found.target_state)
-        )
-        excitation = None if found.excitation is None else found.excitation[np.newaxis]
-        quiet = self.quiet(committee.members, genes, excitation, (start, target), hold_back)
-        members = list(compress(committee.members, quiet.stable))
-        flights = self.judge(
-            members, genes, committee.sds, self.options.draws, excitation, (start, target), measured=True,
-            hold_back=hold_back,
-        )  # fmt: skip
+        test = self.test(found.genes, found.initial_state, found.target_state, found.excitation)
+        test = replace(test, hold_back=hold_back)
+        members, flights = self.as_flown(committee.members, test, committee.sds, self.options.draws)
         predicted, spread = expected(flights.qualities[:, :, 0])
-        inside = quiet.of(quiet.stable).worst_usage[0] <= 1.0 - self.options.margin
+        inside = self.quiet_test(members, test).worst_usage[0] <= 1.0 - self.options.margin
         safe = bool(inside and not outside(flights.usages).any())
-        return replace(found, predicted=predicted, spread=spread, risk=risk(flights.usages), safe=safe)
+        return replace(
+            found,
+            predicted=predicted,
+            spread=spread,
+            risk=risk(flights.usages),
+            safe=safe,
+            hold_back=hold_back,
+        )
 
     def excites(self, committee: Committee) -> bool:
         """Whether flights excite the commands that answer to states of which a committee knows no law, held back."""

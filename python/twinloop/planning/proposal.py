@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop.planning.leaving import least_risk
 from twinloop.planning.seen import Seen
@@ -100,6 +101,7 @@ class Proposal:
         disagreement: of the committee, log det.
         gain: quality that knowing the right member would bring, by the committee's own estimate.
         reason: for a person.
+        hold_back: what holds its excitation back; None: nothing does.
     """
 
     genes: Floats
@@ -113,3 +115,4 @@ class Proposal:
     disagreement: float
     gain: float
     reason: str
+    hold_back: HoldBack | None = None

@@ -202,7 +202,7 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
-            hold_back=self._held_back(book, committee, found),
+            hold_back=found.hold_back,
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
@@ -213,7 +213,7 @@ class IdentifyAndPlan:
         hold_back = self._held_back(book, committee, found)
         if hold_back is not None:
             found = self.planner.held(committee, found, hold_back)
-        gusts = committee.moved_by_gusts(replace(self._as_test(book, found), hold_back=hold_back))
+        gusts = committee.moved_by_gusts(self._as_test(book, found))
         predicted, spread = gusts.added_to(found.predicted, found.spread)
         spread = calibrated(spread, predicted, book.experiments, self._latest().misses)
         own = standing.fared(book, found.genes, found.excitation is not None)
@@ -256,6 +256,7 @@ class IdentifyAndPlan:
         return replace(
             book.of_task(found.genes, len(book.tests)),
             initial_state=found.initial_state, target_state=found.target_state, excitation=found.excitation,
+            hold_back=found.hold_back,
         )  # fmt: skip
 
     def _asked_of_nobody(self, book: Logbook) -> Test:
