@@ -139,7 +139,7 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
             f"Trajectory: expected {state.name} within {in_unit(f'{farthest[i]:g}', state.unit)} (twice the divergence"
             f" factor times its scale), found {trajectory.states[k, i]:g} at",
             int(k),
-            "; cut the record before it, or declare a larger scale.",
+            "; check its unit (degrees, milli?), cut the record before it, or declare a larger scale.",
         )
     _check_commands(trajectory, signals)
 

@@ -14,7 +14,7 @@ from twinloop.campaign.examination.log_check import check_log
 from twinloop.campaign.identify_and_plan.outputs_alone import outputs_alone
 from twinloop.contracts import check_system
 from twinloop.faces.figures.residuals import autocorrelation, crosscorrelation
-from twinloop.faces.sheet import sheet
+from twinloop.faces.sheet import Sheet
 from twinloop.guard import Guard
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 from twinloop.law.exports.controller_source import controller_c, controller_python
@@ -301,7 +301,7 @@ def test_a_person_is_told_how_the_rate_is_made_and_what_to_record(tmp_path):
         SIGNALS, controller=PID, initial_state=[0.0], target_state=[1.2], duration=1.0, progress=None
     )
     made = "angle_rate is not measured: (angle - angle a period before) / 0.05 s, 0 in the first period"
-    text = sheet(StoredAs("rig.db"), campaign.test(GAINS), None, "rig-test-0.csv", campaign.setup)
+    text = Sheet(StoredAs("rig.db"), campaign.test(GAINS), "rig-test-0.csv", campaign.setup).text
     assert f"{made}.\nRecord t, angle, torque, then:" in text
     family = PID.bind(SIGNALS)
     genes = family.genes(GAINS)

@@ -21,7 +21,7 @@ from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, read_signals, template
 from twinloop.campaign.examination import checking
 from twinloop.faces.cli import main
-from twinloop.faces.sheet import foretold, sheet
+from twinloop.faces.sheet import Sheet, foretold
 from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
 from twinloop.planning.leaving import risk_words
@@ -193,7 +193,7 @@ def test_gains_that_no_committee_judged_are_not_called_those_of_a_trusted_contro
     assert "no committee has judged this test" in said["risk_unknown"]
     assert said["why"] in text and ("not vouched" in said["why"] or "without a committee" in said["why"])
     assert "first flight" not in text and "already trust" not in text
-    assert "already trust" in sheet(StoredAs("arm.db"), own, None, "rig-test-2.csv", campaign.setup)
+    assert "already trust" in Sheet(StoredAs("arm.db"), own, "rig-test-2.csv", campaign.setup).text
     assert [test.number for test in tl.Campaign.load("arm.db", read_only=True).asked] == [1]
 
 
@@ -236,7 +236,7 @@ def test_rows_after_the_twin_has_diverged_say_so():
     campaign = lives.new("default")
     test = campaign.test(lives.PENDULUM_GAINS)
     predicted = lives.cut(lives.PLANT.run(test), 7, ended="diverged")
-    shown = sheet(StoredAs("rig.db"), test, predicted, "rig-test-0.csv", campaign.setup)
+    shown = Sheet(StoredAs("rig.db"), test, "rig-test-0.csv", campaign.setup, predicted).text
     rows = [line.split() for line in shown.splitlines()]
     rows = {round(float(row[0]) / SIGNALS.dt): row[1:] for row in rows if row and row[0][0].isdigit()}
     assert set(rows) >= {0, 6, 8, 20}
@@ -338,11 +338,13 @@ def test_a_sheet_says_that_another_test_waits_with_its_gains(folder):
     test = campaign.tests[0]
     near = replace(test, number=7, genes=test.genes * (1.0 + 1e-12))
     other = replace(test, number=8, genes=test.genes * 1.001)
-    said = sheet(
-        StoredAs("rig.db"), test, None, "rig-test-0.csv", campaign.setup, waiting=(test, near, other)
-    )
-    assert "Test 7, which waits too, has these gains with another excitation." in said
-    assert said.count("waits too") == 1
+    led, quiet = test.target_state + 0.1, {"excitation": None, "hold_back": None}
+    elsewhere = replace(test, number=9, target_state=led, **quiet)
+    waiting = (test, near, other, elsewhere)
+    said = Sheet(StoredAs("rig.db"), test, "rig-test-0.csv", campaign.setup, waiting=waiting).text
+    assert "Test 7, which waits too, has these gains with the same start, target and excitation." in said
+    assert "Test 9, which waits too, has these gains with another target and another excitation." in said
+    assert said.count("waits too") == 2
 
 
 def test_what_is_learnt_from_a_batch_is_the_same_with_and_without_the_abandoned(folder):

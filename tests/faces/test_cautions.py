@@ -1,7 +1,6 @@
 """What a test sheet says against its own prediction: the band leaves the envelope, the twin is not reliable."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +12,7 @@ from lives import SMALL
 from twinloop.campaign.assessment import Advice
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.faces.cautions import advised_to_stop, leaving
-from twinloop.faces.sheet import _table, facts, sheet
+from twinloop.faces.sheet import Sheet, _table
 from twinloop.remarks import serious
 from twinloop.store import StoredAs
 
@@ -45,7 +44,7 @@ def predicted(low=-0.1, high=0.1, rate=0.0):
 
 def said(campaign, run, against=()):
     test = campaign.test(PENDULUM_GAINS)
-    return sheet(StoredAs("rig.db"), test, run, "rig-test-0.csv", campaign.setup, against)
+    return Sheet(StoredAs("rig.db"), test, "rig-test-0.csv", campaign.setup, run, against).text
 
 
 def test_a_band_that_leaves_the_envelope_is_said(campaign):
@@ -77,7 +76,8 @@ def test_a_twin_that_is_not_reliable_is_said_with_the_first_reason(campaign):
     assert line in said(campaign, predicted(), against)
     assert "not reliable" not in said(campaign, predicted())
     test = campaign.test(PENDULUM_GAINS)
-    found = facts(test, Path("rig-test-0.csv"), True, predicted(high=2.0), against)
+    rig = StoredAs("rig.db")
+    found = Sheet(rig, test, "rig-test-0.csv", campaign.setup, predicted(high=2.0), against).facts
     assert found["serious"] == ["free-run", "unmoved"] and found["band_leaves"] == {"angle": [0.0, 1.0]}
 
 
@@ -100,14 +100,14 @@ def test_where_the_advice_is_to_stop_a_sheet_says_so_first(campaign):
 
     to_stop = "The advice is to stop: for the controller another flight would bring less than the scatter of"
     assert advised().startswith(to_stop)
-    text = sheet(StoredAs("rig.db"), test, None, "rig-test-0.csv", campaign.setup, advice=advised())
-    assert text.splitlines()[1] == advised()
-    assert facts(test, Path("rig-test-0.csv"), True, None, (), advised())["advice"] == advised()
+    told = Sheet(StoredAs("rig.db"), test, "rig-test-0.csv", campaign.setup, advice=advised(), flown=True)
+    assert told.text.splitlines()[1] == advised()
+    assert told.facts["advice"] == advised()
     # Before the controller to fly has flown there is a flight to be made.
     assert advised(measured=None) == advised(stop=False) == advised(stop=None) == ""
     # Nor is it the advice where the verdict is that a check fails.
     assert advised(checks=[fails]) == ""
-    assert facts(test, Path("rig-test-0.csv"), True, None, ())["advice"] is None
+    assert replace(told, advice="").facts["advice"] is None
     assert "advice" not in said(campaign, None)
     for nothing in (SimpleNamespace(history=[]), SimpleNamespace(history=[0], advice=None)):
         assert advised_to_stop(nothing) == ""
@@ -117,7 +117,7 @@ def test_a_sheet_says_what_is_scaled_and_what_a_program_does_that_cannot(campaig
     text = said(campaign, None)
     assert "rig-test-0.csv has the rows to be scaled." in text and "hold_back = false under [options]" in text
     quiet = replace(campaign.test(PENDULUM_GAINS), excitation=None, hold_back=None)
-    assert "hold_back" not in sheet(StoredAs("rig.db"), quiet, None, "rig-test-0.csv", campaign.setup)
+    assert "hold_back" not in Sheet(StoredAs("rig.db"), quiet, "rig-test-0.csv", campaign.setup).text
 
 
 def test_a_line_break_in_a_unit_makes_no_row_of_its_own():

@@ -21,11 +21,13 @@ FRONTS = {
     ),
     "autopilots": "declared files sweep",
     "campaign": (
-        "agreement assessment campaign_file certificate cost excited from_logs history keeping persistence presets "
+        "agreement assessment campaign_file certificate cost from_logs history keeping persistence presets "
         "provenance remaining setup"
     ),
     "campaign/coevolution": "method search",
-    "campaign/data": "begun copies declared gains lateness levels odd_one_out readings reports rows sent wrapped",
+    "campaign/data": (
+        "begun copies declared excited gains lateness levels odd_one_out readings reports rows sent wrapped"
+    ),
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "reaching rivals steps unseen use"

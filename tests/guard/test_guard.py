@@ -778,6 +778,15 @@ def test_a_target_that_is_not_finite_trips_and_the_fallback_goes_on_to_that_of_t
         found = guard.command(readings[k], test.target(k) if k < 3 else [wrong, 0.0])
         assert np.isfinite(found).all() and guard.tripped == (k >= 3)
     assert guard.tripped_at == 3 and guard.reason.endswith("the target is not finite")
+    # The record ends with what was read then, as wherever it trips.
+    assert same_bits(guard.trajectory().states, readings[:4])
+
+
+def test_what_was_read_first_is_recorded_where_the_first_target_is_not_finite(campaign):
+    test = campaign.test(GOOD)
+    guard = campaign.guard(test, clock=None)
+    guard.command([0.1, -0.2], [np.nan, 0.0])
+    assert guard.trajectory().states.tolist() == [[0.1, -0.2]]
 
 
 # Systems

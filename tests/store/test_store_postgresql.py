@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from sqlalchemy import create_engine, text
+from sqlalchemy.event import listens_for
 
 import twinloop as tl
 from lives import (
@@ -31,6 +32,7 @@ from lives import (
 from needed import lacking, needed
 from old_store import old_store
 from sameness import same
+from twinloop.campaign import keeping
 from twinloop.faces.cli import main
 from twinloop.logs import write_columns
 from twinloop.store import listed, opened
@@ -118,6 +120,31 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):
     campaign.close()
     other.close()
     tl.Campaign.load(address, "one").close()
+
+
+def test_a_reader_sees_one_moment_while_others_write(server, pendulum, monkeypatch):
+    address = fresh(server, "moments")
+    campaign = flown(stored(address), pendulum)
+    opened_to_read, writes = keeping.opened, []
+
+    def opened_beside_a_writer(*where, **how):
+        source = opened_to_read(*where, **how)
+
+        @listens_for(source.engine, "before_cursor_execute")
+        def write(connection, cursor, statement, *_):
+            if "FROM experiments" in statement and "count" not in statement and not writes:
+                writes.append(statement)
+                test = campaign.test(OTHER_GAINS)
+                campaign.tell(test, pendulum.run(test))
+
+        return source
+
+    monkeypatch.setattr(keeping, "opened", opened_beside_a_writer)
+    before = tl.Campaign.load(address, read_only=True)
+    assert writes and (len(before.tests), len(before.experiments)) == (1, 1)
+    after = tl.Campaign.load(address, read_only=True)
+    assert (len(after.tests), len(after.experiments)) == (2, 2)
+    campaign.close()
 
 
 def test_a_lock_that_was_released_is_free_before_the_server_notices_that_its_connection_has_ended(server):

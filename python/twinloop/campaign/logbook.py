@@ -96,10 +96,10 @@ class Logbook(Recorded, kind="logbook"):
                 )
         runs = read(list[tuple[int | None, Any]], found["experiments"], f"{where}.experiments")
         for i, (number, run) in enumerate(runs):
-            book.enter(book._run(number, run, f"{where}.experiments[{i}]"))
+            book.recorded.append(book._run(number, run, f"{where}.experiments[{i}]"))
         failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
         for i, (number, failure) in enumerate(failures):
-            book._report(book._failure(number, failure, f"{where}.failures[{i}]"))
+            book.reported.append(book._failure(number, failure, f"{where}.failures[{i}]"))
         book.abandoned = read(list[int], found["abandoned"], f"{where}.abandoned")
         for i, number in enumerate(book.abandoned):
             book._numbered(number, f"{where}.abandoned[{i}]")
@@ -151,16 +151,27 @@ class Logbook(Recorded, kind="logbook"):
         Raises:
             InvalidInput: there are fewer.
         """
-        if not 0 < experiments <= len(self.experiments):
-            raise InvalidInput(
-                f"Logbook: expected 1 to {len(self.experiments)} experiments, found {experiments}; what was learnt"
-                " belongs to another campaign."
-            )
+        self.check_known(experiments)
         book = self.copied()
         book.recorded, book.withdrawals = self.experiments[:experiments], []
         book.reported = list(self.failures)
         book._recount()
         return book
+
+    def check_known(self, experiments: int) -> None:
+        """Refuses a number of first experiments that there are not.
+
+        Args:
+            experiments: how many.
+
+        Raises:
+            InvalidInput: there are fewer.
+        """
+        if not 0 < experiments <= len(self.experiments):
+            raise InvalidInput(
+                f"Logbook: expected 1 to {len(self.experiments)} experiments, found {experiments}; what was learnt"
+                " belongs to another campaign."
+            )
 
     def when_asked(self, known: int, test: int) -> Logbook:
         """The book as it was when a test was asked for, without what was withdrawn since.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from twinloop.errors import NotTrusted
-from twinloop.law.exports.export import asked, delivered, exported_controller
+from twinloop.law.exports.export import asked, by_force, delivered, exported_controller
 from twinloop.law.exports.gymnasium_source import Episode
 from twinloop.test import Test
 
@@ -52,7 +52,7 @@ def taken_controller(
     )
     if parameters is None and not force:
         _refuse_unproven(campaign)
-    return delivered(texts, name, path)
+    return delivered(by_force(texts) if force else texts, name, path)
 
 
 def _refuse_unproven(campaign: Campaign) -> None:

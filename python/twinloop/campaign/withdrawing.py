@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from twinloop._ground.texts import text
+from twinloop.campaign.data.excited import as_excited, excited, hidden
 from twinloop.campaign.data.gains import flown_otherwise
 from twinloop.campaign.data.rows import late_commands
-from twinloop.campaign.excited import as_excited, excited, hidden
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.test import Test
@@ -66,9 +66,8 @@ def as_it_counts(run: Experiment, place: int, book: Logbook) -> Experiment:
     # In other rows than those of their readings commands tell neither gains nor an excitation.
     late = test is not None and any(late_commands(test, run.trajectory))
     if test is not None and not late and setup.preset != "paper":
-        # Tests that surely had been made when the run was told: what it counts for must not change with later ones.
-        latest = max(told.number for told in [*book.recorded[:place], run] if told.number is not None)
-        otherwise = flown_otherwise(test, run.trajectory, setup.controller, book.tests[: latest + 1])
+        others = book.tests[: _made_by(run, place, book)]
+        otherwise = flown_otherwise(test, run.trajectory, setup.controller, others)
         if otherwise is not None:
             return replace(run, replayed=otherwise, before=None, final_distance=None, quality=None)
     if test is not None:
@@ -83,6 +82,22 @@ def as_it_counts(run: Experiment, place: int, book: Logbook) -> Experiment:
     ):
         run = replace(run, before=None)
     return run
+
+
+def _made_by(run: Experiment, place: int, book: Logbook) -> int:
+    """How many tests surely had been made when a run was told: what it counts for must not change with later ones.
+
+    They are those up to the last that had been told, or asked for. A test is asked for after as many runs as counted
+    then, beside those that had been withdrawn.
+    """
+    told = [each.number for each in [*book.recorded[:place], run] if each.number is not None]
+    withdrawn = [len(each.known) for each in book.withdrawals if each.run is not None]
+    asked = [
+        entry.test
+        for turn, (counting, entry) in enumerate(book.asked)
+        if counting + sum(turns <= turn for turns in withdrawn) <= place
+    ]
+    return 1 + max(told + asked)
 
 
 def check_withdrawals(book: Logbook, where: str) -> None:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from twinloop._ground.arrays import Floats, floats, number
 from twinloop._ground.texts import text
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
+from twinloop.signals import Signals
+
+ROUNDED = 1e-9
+"""Share of a command's bounds that a command at rest may be beyond them by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +39,11 @@ class Mixer(Recorded, kind="mixer"):
         matrix = floats("Mixer, matrix (commands, axes)", self.matrix, (None, None))
         rows = len(matrix)
         offset = [0.0] * rows if self.offset is None else self.offset
+        if np.ndim(offset) == 1 and len(offset) != rows:
+            raise InvalidInput(
+                f"Mixer: expected a row of the matrix and an entry of the offset for each command, found {rows} and"
+                f" {len(offset)}."
+            )
         object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "offset", floats("Mixer, offset (one entry a command)", offset, (rows,)))
         object.__setattr__(self, "power", number("Mixer, power", self.power, above=0.0))
@@ -44,21 +55,31 @@ class Mixer(Recorded, kind="mixer"):
         assert self.offset is not None  # __post_init__ has set it
         return self.matrix, self.offset, self.power
 
-    def check(self, commands: int, axes: int) -> None:
-        """Checks that the matrix fits these numbers of axes and commands.
+    def check(self, signals: Signals, axes: int) -> None:
+        """Checks that it fits commands, and a number of axes.
 
         Args:
-            commands: n_u.
+            signals: with the commands.
             axes: outputs of the controller's law.
 
         Raises:
-            InvalidInput: a matrix of another shape.
+            InvalidInput: a matrix of another shape, or an offset that no command can reach.
         """
-        if self.matrix.shape != (commands, axes):
+        if self.matrix.shape != (signals.n_u, axes):
             raise InvalidInput(
-                f"Mixer, matrix: expected the shape ({commands}, {axes}) (commands, axes), found"
+                f"Mixer, matrix: expected the shape ({signals.n_u}, {axes}) (commands, axes), found"
                 f" {self.matrix.shape}; one row a command, one column an axis."
             )
+        assert self.offset is not None  # __post_init__ has set it
+        at_rest = np.sign(self.offset) * np.abs(self.offset) ** self.power
+        for command, value in zip(signals.commands, at_rest.tolist(), strict=True):
+            low, high = command.bounds
+            beyond = ROUNDED * max(abs(low), abs(high))
+            if not low - beyond <= value <= high + beyond:
+                raise InvalidInput(
+                    f"Mixer, offset: expected {command.name} within its bounds, {low:g} to {high:g}, where no axis asks"
+                    f" for anything, found {value:g}; give it in the unit of the command."
+                )
 
 
 def check_output(family: str, output: object) -> None:

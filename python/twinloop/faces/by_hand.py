@@ -11,23 +11,22 @@ import click
 from twinloop._ground.texts import to_type
 from twinloop._ground.writing import write_whole
 from twinloop.campaign import Campaign
-from twinloop.campaign.assessment import foreseen, latest_lesson
+from twinloop.campaign.assessment import foreseen
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.persistence import stored_as
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.answering import answer, json_option, name_option, next_command, threads_option
-from twinloop.faces.cautions import advised_to_stop, serious_of, thin_margins
+from twinloop.faces.cautions import advised_to_stop
 from twinloop.faces.columns import columns, columns_file, refuse_other
 from twinloop.faces.files import check_writable
 from twinloop.faces.first_test import first_test
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import fields_beside, opened_by_hand
 from twinloop.faces.result import to_json
-from twinloop.faces.sheet import facts, foretold, sheet
+from twinloop.faces.sheet import Sheet, foretold
 from twinloop.faces.telling import (
     against_it,
     counted,
-    is_chosen,
     numbered,
     said_against,
     tell_failed,
@@ -142,23 +141,8 @@ def _shown(campaign: Campaign, test: Test, advice: str) -> tuple[str, dict[str, 
     file = columns_file(place, test)
     refuse_other(file)
     write_columns(file, columns(test, predicted))
-    against_twin = serious_of(latest_lesson(campaign))
-    flown, chosen = campaign.runs > 0, is_chosen(campaign, test)
-    text = sheet(
-        place,
-        test,
-        predicted,
-        str(file),
-        campaign.setup,
-        against_twin,
-        campaign.waiting,
-        advice,
-        flown,
-        chosen,
-        fields_beside(place.store),
-        thin_margins(campaign, test),
-    )
-    return text, facts(test, file, flown, predicted, against_twin, advice, chosen)
+    shown = Sheet.of(campaign, place, test, predicted, str(file), advice)
+    return shown.text, shown.facts
 
 
 @click.command()

@@ -19,10 +19,10 @@ from twinloop.campaign.assessment import (
     predicted_quality,
 )
 from twinloop.campaign.cost import Cost
+from twinloop.campaign.data.excited import hidden
 from twinloop.campaign.examination.beside import Beside
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Examination
-from twinloop.campaign.excited import hidden
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.faces.verdict import verdict, verdict_facts

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import isfinite
-from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
 from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.arrays import Floats
-from twinloop._ground.texts import in_unit, one_line, two_digits
+from twinloop._ground.texts import enumerated, in_unit, one_line, two_digits
+from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import latest_lesson
 from twinloop.campaign.data.begun import allowed_off
 from twinloop.campaign.setup import Setup
-from twinloop.faces.cautions import band_leaves, leaving, not_reliable
+from twinloop.faces.cautions import band_leaves, leaving, not_reliable, serious_of, thin_margins
 from twinloop.faces.ends import ends, varying, varying_words
-from twinloop.faces.text import quality_words, table
+from twinloop.faces.opening import fields_beside
+from twinloop.faces.result import quality_facts
+from twinloop.faces.telling import is_chosen, to_be_flown
+from twinloop.faces.text import counted, quality_words, table
 from twinloop.logs import TIME
 from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
@@ -28,6 +32,159 @@ from twinloop.unmeasured import in_words
 
 ROWS = 10
 """Of the predicted run on a sheet, after the first; the file has all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A test that waits to be flown, with all that is said of it beforehand.
+
+    Args:
+        stored_as: under what the next command finds the campaign.
+        test: to be flown.
+        file: where its columns are.
+        setup: of the campaign.
+        predicted: its run on the twin; None where nothing is known yet.
+        against: what speaks against the twin.
+        waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
+        advice: to stop instead; empty where there is none.
+        flown: whether any test was flown yet, recorded or failed; attached flights are of none.
+        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
+        called: what columns of logs are called, by signal, where they have other names.
+        margins: what is said of them where they are thin.
+    """
+
+    stored_as: StoredAs
+    test: Test
+    file: str
+    setup: Setup
+    predicted: Trajectory | None = None
+    against: Sequence[Remark] = ()
+    waiting: Sequence[Test] = ()
+    advice: str = ""
+    flown: bool = False
+    chosen: bool = False
+    called: Mapping[str, str] = field(default_factory=dict)
+    margins: Sequence[str] = ()
+
+    @staticmethod
+    def of(
+        campaign: Campaign,
+        stored_as: StoredAs,
+        test: Test,
+        predicted: Trajectory | None,
+        file: str,
+        advice: str,
+    ) -> Sheet:
+        """The sheet of a test of a campaign.
+
+        Args:
+            campaign: that it was made in.
+            stored_as: under what the next command finds the campaign.
+            test: to be flown.
+            predicted: its run on the twin; None where nothing is known yet.
+            file: where its columns are.
+            advice: to stop instead; empty where there is none. Alternatives share it.
+        """
+        return Sheet(
+            stored_as,
+            test,
+            file,
+            campaign.setup,
+            predicted,
+            against=serious_of(latest_lesson(campaign)),
+            waiting=to_be_flown(campaign),
+            advice=advice,
+            flown=campaign.runs > 0,
+            chosen=is_chosen(campaign, test),
+            called=fields_beside(stored_as.store),
+            margins=thin_margins(campaign, test),
+        )
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What it says, for programs."""
+        test, signals = self.test, self.test.family.signals
+        leaves = leaving(signals, self.predicted)
+        unknown = unknown_risk(test, self.flown, self.chosen) if test.risk is None else None
+        return {
+            "test": test.number,
+            "gains": test.parameters,
+            "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
+            "target_state": {
+                **dict(zip(signals.state_names, np.atleast_2d(test.target_state)[-1].tolist(), strict=True)),
+                **{name: rows.tolist() for name, rows in varying(test).items()},
+            },
+            "steps": test.steps,
+            "dt": signals.dt,
+            "excited": test.excitation is not None,
+            "hold_back": None if test.hold_back is None else test.hold_back.ranges(signals),
+            "predicted": test.predicted,
+            "spread": test.spread,
+            "risk": test.risk,
+            "risk_unknown": unknown,
+            "band_leaves": {name: list(times) for name, times in leaves.items()},
+            "serious": list(dict.fromkeys(remark.code for remark in self.against)),
+            "advice": self.advice or None,
+            "why": reason(test, self.predicted is not None, self.chosen),
+            "file": self.file,
+        }
+
+    @property
+    def text(self) -> str:
+        """What it says, to be printed."""
+        test, file, signals = self.test, self.file, self.test.family.signals
+        units = {gain.name: gain.unit for gain in test.family.law_gains}
+        gains = [[name, value, units[name]] for name, value in _set(test).items()]
+        lines = [
+            f"TEST {test.number} of {self.stored_as.store}: {test.steps} periods of {signals.dt:g} s",
+            *([self.advice] if self.advice else []),
+            "",
+            _table(["set this gain", "to", "unit"], gains),
+            *_at_bounds(test),
+            "",
+            *_ends(test, file),
+            "",
+            _begin_within(test),
+            "",
+            excitation_words(test, file),
+            *_held_back(test, file),
+            *self._foreseen(),
+            *band_leaves(signals, self.predicted),
+            *self.margins,
+            *not_reliable(self.stored_as, self.against),
+            reason(test, self.predicted is not None, self.chosen),
+            *_alike(test, self.waiting),
+            *(f"{one}." for one in in_words(signals)),
+            f"Record {', '.join(self._columns())}, then:",
+            f"  {self.stored_as.to_type('tell', test.number, 'FLIGHT.csv')}",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def _foreseen(self) -> Iterator[str]:
+        """The quality and the run that are predicted, and the risk."""
+        test, predicted, bounded = self.test, self.predicted, is_bounded(self.test.family.signals)
+        if test.predicted is not None and predicted is not None:
+            quality = self.setup.quality
+            measure = quality_words(quality.kind, quality_unit(quality))
+            yield f"Predicted quality, {measure}: {foretold(test)}; what counts: {counted(quality_facts(quality))}."
+            yield f"The predicted run with its band: {self.file}."
+        if test.excitation is not None or predicted is not None:
+            yield from ("", _expected(test, predicted), "")
+        risk = (
+            unknown_risk(test, self.flown, self.chosen)
+            if test.risk is None
+            else f"{risk_words(test.risk, self.setup.predicted_flights, bounded)}."
+        )
+        yield f"Risk of {risk_of_what(bounded)}: {risk}"
+
+    def _columns(self) -> list[str]:
+        """What a log of the flight has to have, as logs call it."""
+        signals, called = self.test.family.signals, self.called
+        read = [signals.state_names[i] for i in signals.measured]
+        return [
+            f"{name} ({called[name].strip()!r})" if name in called else name
+            for name in (TIME, *read, *signals.command_names)
+        ]
 
 
 def _ends(test: Test, file: str) -> list[str]:
@@ -180,49 +337,15 @@ def _listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def facts(
-    test: Test,
-    file: Path,
-    flown: bool,
-    predicted: Trajectory | None,
-    against: Sequence[Remark],
-    advice: str = "",
-    chosen: bool = False,
-) -> dict[str, object]:
-    """The sheet as values.
-
-    Args:
-        test: to be flown.
-        file: where its columns are.
-        flown: whether any test was flown yet, recorded or failed; attached flights are of none.
-        predicted: its run on the twin; None where nothing is known yet.
-        against: what speaks against the twin.
-        advice: to stop instead; empty where there is none.
-        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
-    """
-    signals = test.family.signals
-    return {
-        "test": test.number,
-        "gains": test.parameters,
-        "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
-        "target_state": {
-            **dict(zip(signals.state_names, np.atleast_2d(test.target_state)[-1].tolist(), strict=True)),
-            **{name: rows.tolist() for name, rows in varying(test).items()},
-        },
-        "steps": test.steps,
-        "dt": signals.dt,
-        "excited": test.excitation is not None,
-        "hold_back": None if test.hold_back is None else test.hold_back.ranges(test.family.signals),
-        "predicted": test.predicted,
-        "spread": test.spread,
-        "risk": test.risk,
-        "risk_unknown": unknown_risk(test, flown, chosen) if test.risk is None else None,
-        "band_leaves": {name: list(times) for name, times in leaving(signals, predicted).items()},
-        "serious": list(dict.fromkeys(remark.code for remark in against)),
-        "advice": advice or None,
-        "why": reason(test, predicted is not None, chosen),
-        "file": str(file),
-    }
+def _at_bounds(test: Test) -> list[str]:
+    """Gains at a bound of theirs, where the box decides and not the quality; those at 0 are not missed."""
+    at = test.family.at_bounds(test.genes)
+    ends = [
+        f"{gain.name} is at its {at[gain.name]} bound, {end:.4g}"
+        for gain in test.family.gains
+        if at[gain.name] and (end := gain.low if at[gain.name] == "lower" else gain.high) != 0.0
+    ]
+    return [f"{enumerated(ends)}: better gains may lie beyond."] if ends else []
 
 
 def _begin_within(test: Test) -> str:
@@ -255,12 +378,27 @@ def _held_back(test: Test, file: str) -> list[str]:
 
 
 def _alike(test: Test, waiting: Sequence[Test]) -> list[str]:
-    """The tests that wait with the gains of this one, as far as a sheet shows them."""
+    """The tests that wait with the gains of this one, as far as a sheet shows them, and in what they differ."""
     return [
-        f"Test {other.number}, which waits too, has these gains with another excitation."
+        f"Test {other.number}, which waits too, has these gains with {_otherwise(test, other)}."
         for other in waiting
         if other.number != test.number and _set(other) == _set(test)
     ]
+
+
+def _otherwise(test: Test, other: Test) -> str:
+    """In what a test with the same gains differs from another one."""
+    asked = {
+        "start": (test.initial_state, other.initial_state),
+        "target": (test.target_state, other.target_state),
+        "excitation": (test.excitation, other.excitation),
+    }
+    differs = [f"another {name}" for name, (one, two) in asked.items() if not _equal(one, two)]
+    return enumerated(differs) if differs else "the same start, target and excitation"
+
+
+def _equal(one: Floats | None, other: Floats | None) -> bool:
+    return one is other if one is None or other is None else np.array_equal(one, other)
 
 
 def _set(test: Test) -> dict[str, str]:
@@ -271,78 +409,3 @@ def _set(test: Test) -> dict[str, str]:
 def _range(ends: list[float | None]) -> str:
     low, high = ("any" if end is None else f"{end:.4g}" for end in ends)
     return f"{low} to {high}"
-
-
-def sheet(
-    stored_as: StoredAs,
-    test: Test,
-    predicted: Trajectory | None,
-    file: str,
-    setup: Setup,
-    against: Sequence[Remark] = (),
-    waiting: Sequence[Test] = (),
-    advice: str = "",
-    flown: bool = False,
-    chosen: bool = False,
-    called: Mapping[str, str] = MappingProxyType({}),
-    margins: Sequence[str] = (),
-) -> str:
-    """The test sheet, to be printed.
-
-    Args:
-        stored_as: under what the next command finds the campaign.
-        test: to be flown.
-        predicted: its run on the twin; None where nothing is known yet.
-        file: where its columns are.
-        setup: of the campaign.
-        against: what speaks against the twin.
-        waiting: tests that wait to be flown: of an alternative with equal gains it is said in what it differs.
-        advice: to stop instead; empty where there is none.
-        flown: whether any test was flown yet, recorded or failed; attached flights are of none.
-        chosen: whether the campaign chose it, by `ask`; otherwise it is a person's own.
-        called: what columns of logs are called, by signal, where they have other names.
-        margins: what is said of them where they are thin.
-    """
-    signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
-    gains = [[name, value, units[name]] for name, value in _set(test).items()]
-    lines = [
-        f"TEST {test.number} of {stored_as.store}: {test.steps} periods of {signals.dt:g} s",
-        *([advice] if advice else []),
-        "",
-        _table(["set this gain", "to", "unit"], gains),
-        "",
-        *_ends(test, file),
-        "",
-        _begin_within(test),
-        "",
-        excitation_words(test, file),
-        *_held_back(test, file),
-    ]
-    if test.predicted is not None and predicted is not None:
-        quality = setup.quality
-        measure = quality_words(quality.kind, quality_unit(quality))
-        lines.append(
-            f"Predicted quality, {measure}: {foretold(test)}; the predicted run with its band: {file}."
-        )
-    if test.excitation is not None or predicted is not None:
-        lines += ["", _expected(test, predicted), ""]
-    bounded = is_bounded(signals)
-    risk = (
-        unknown_risk(test, flown, chosen)
-        if test.risk is None
-        else f"{risk_words(test.risk, setup.predicted_flights, bounded)}."
-    )
-    lines.append(f"Risk of {risk_of_what(bounded)}: {risk}")
-    lines += band_leaves(signals, predicted)
-    lines += margins
-    lines += not_reliable(stored_as, against)
-    lines += [reason(test, predicted is not None, chosen), *_alike(test, waiting)]
-    lines += [f"{one}." for one in in_words(signals)]
-    read = [signals.state_names[i] for i in signals.measured]
-    columns = [
-        f"{name} ({called[name].strip()!r})" if name in called else name
-        for name in (TIME, *read, *signals.command_names)
-    ]
-    lines.append(f"Record {', '.join(columns)}, then:")
-    lines.append(f"  {stored_as.to_type('tell', test.number, 'FLIGHT.csv')}")
-    return "\n".join(lines) + "\n"

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from twinloop._ground.texts import whole_characters
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import learnt
@@ -282,10 +280,14 @@ def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | 
     the same.
     """
     for told, name in zip(campaign.experiments, names_of(campaign.experiments), strict=True):
+        otherwise = ""
         if recorded_as(run, told.trajectory, campaign.signals):
             if test is not None and _again(told.test, test):
                 continue
-            how = "one that is recorded already, equal to the last digit"
+            how = f"one that is recorded already, as {name}, equal to the last digit"
+            if test is not None and told.number != test.number:
+                withdraw = next_command(campaign, "withdraw", "LOG", "--reason", "WHY")
+                otherwise = f"; if it is no flight of {name}, withdraw that first, by its log: {withdraw}"
         elif (test is None or (told.test is not None and told.test.number == test.number)) and saved_again(
             run, told.trajectory, campaign.signals
         ):
@@ -293,14 +295,11 @@ def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | 
         else:
             continue
         raise InvalidInput(
-            f"Log {called}: expected a new flight, found {how}; nothing was changed. Name the log of this flight."
+            f"Log {called}: expected a new flight, found {how}; nothing was changed. Name the log of this flight"
+            f"{otherwise}."
         )
 
 
 def _again(earlier: Test | None, test: Test) -> bool:
     """Whether a test asks for what another one did: an exact simulator then flies the same."""
-    if earlier is None or earlier.number == test.number or not np.array_equal(earlier.genes, test.genes):
-        return False
-    if earlier.excitation is None or test.excitation is None:
-        return earlier.excitation is test.excitation
-    return bool(np.array_equal(earlier.excitation, test.excitation))
+    return earlier is not None and earlier.number != test.number and earlier.asks_as(test)

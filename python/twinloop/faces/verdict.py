@@ -18,6 +18,8 @@ from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
 from twinloop.faces.text.words import every, flown_words, quality_words
 
+ALL_CHECKS = ("checks", "all checks")
+"""Where all checks stand, and what to call it."""
 EVIDENCE = {
     "follows": "flights",
     "unseen-flight": "unseen",
@@ -142,7 +144,7 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
     return Sentence(
         "Twin", answers.TRUST, True, f"{text} {_scope(found)}".strip(),
         (("unseen", "unseen flight"), ("ranges", "flown range"), ("crosscorrelation", "residuals"),
-         ("checks", "all checks")),
+         ALL_CHECKS),
     )  # fmt: skip
 
 
@@ -194,7 +196,7 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
     failed = [check for check in checks.failed if check.subject == "controller"]
     if best is None or found.best is None:
         return Sentence(
-            "Controller", answers.NONE_TO_FLY, False, found.no_controller, (("checks", "all checks"),),
+            "Controller", answers.NONE_TO_FLY, False, found.no_controller, (ALL_CHECKS,),
             (found.no_controller,),
         )  # fmt: skip
     measure = result["quality"]
@@ -272,78 +274,64 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
         checks: of it.
         result: its `twinloop.faces.result.summary`.
     """
-    advice = result.get("advice")
-    unit = result["quality"]["unit"]
-    links = (("next", "next experiment"),)
-    off = _off_target(found)
-    stop = answers.STOP_OR_OTHER_TASK if off else answers.STOP
-    good = None if off else True
+    advice, off = result.get("advice"), _off_target(found)
     if found.best is None:
         text = "There is no controller to fly: look into the checks that fail, and fly one that you trust."
-        return Sentence(
-            "Next", answers.FLY_ANOTHER_CONTROLLER, False, text, (("checks", "all checks"), *links)
-        )
+        return _next(answers.FLY_ANOTHER_CONTROLLER, text, ALL_CHECKS, good=False)
     if advice is None:
-        return Sentence(
-            "Next",
-            answers.YOU_DECIDE,
-            None,
-            "The preset paper does not say what another test would bring.",
-            links,
-        )
+        return _next(answers.YOU_DECIDE, "The preset paper does not say what another test would bring.")
     if not checks.twin_passed:
         text = (
             "Look into the checks that fail, then fly again where they point: the twin's estimate of what"
             " another flight would bring is no better than the twin."
         )
-        return Sentence("Next", answers.FIND_OUT, False, text, (("checks", "all checks"), *links))
+        return _next(answers.FIND_OUT, text, ALL_CHECKS, good=False)
     if advice["gain"] is not None and advice["stop"] is None and not advice["trusted"]:
         text = (
             "The twin cannot say what another flight would bring, since it did not follow its runs when that was"
             " estimated, or no command acts in it: look into the remarks, then fly another test."
         )
-        return Sentence("Next", answers.FLY_ANOTHER, None, text, (("remarks", "remarks"), *links))
+        return _next(answers.FLY_ANOTHER, text, ("remarks", "remarks"))
     failed = [check for check in checks.failed if check.subject == "controller"]
     if failed and (advice["stop"] or advice["gain"] == 0.0):
-        knows = "The twin knows enough: another flight would hardly improve the quality."
-        if found.margins is None:
-            text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"
-            return Sentence("Next", answers.OTHER_TASK, None, text, (*_links(found, failed), *links))
-        text = (
-            f"{knows} What fails is the controller:"
-            f" {failed[0].name}. Begin again from these flights with narrower bounds of its gains, or with effort in"
-            f" the quality.{off}"
-        )
-        return Sentence("Next", answers.CALMER_CONTROLLER, None, text, (*_links(found, failed), *links))
+        return _next_of_failed(found, failed, off)
     if advice["gain"] is None:
-        return Sentence(
-            "Next",
-            answers.ASK,
-            None,
-            "No flight was planned yet; ask for one to see what it would bring.",
-            links,
-        )
+        return _next(answers.ASK, "No flight was planned yet; ask for one to see what it would bring.")
+    return _next_of_gain(advice, result["quality"]["unit"], off)
+
+
+def _next_of_failed(found: Examination, failed: list[Check], off: str) -> Sentence:
+    """What to do where the twin knows enough and its controller is not to be flown."""
+    knows, links = (
+        "The twin knows enough: another flight would hardly improve the quality.",
+        _links(found, failed),
+    )
+    if found.margins is None:
+        text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"
+        return _next(answers.OTHER_TASK, text, *links)
+    text = (
+        f"{knows} What fails is the controller: {failed[0].name}. Begin again from these flights with narrower bounds"
+        f" of its gains, or with effort in the quality.{off}"
+    )
+    return _next(answers.CALMER_CONTROLLER, text, *links)
+
+
+def _next_of_gain(advice: Mapping[str, Any], unit: str, off: str) -> Sentence:
+    """What to do by how much another flight would improve the quality."""
+    stop, good = (answers.STOP_OR_OTHER_TASK, None) if off else (answers.STOP, True)
     if advice["gain"] == 0.0:
         text = f"The models agree on what to fly: another flight would not improve the quality.{off}"
-        return Sentence("Next", stop, good, text, links)
-    gain, scatter = _number(advice["gain"]), _number(advice["scatter"])
+        return _next(stop, text, good=good)
+    gain, scatter = (in_unit(_number(advice[name]), unit) for name in ("gain", "scatter"))
     if advice["stop"]:
-        text = f"Another flight would improve the quality by {in_unit(gain, unit)}"
-        return Sentence(
-            "Next",
-            stop,
-            good,
-            f"{text}; the same flight repeated scatters by {in_unit(scatter, unit)}.{off}",
-            links,
-        )
-    text = f"Another flight may improve the quality by {in_unit(gain, unit)}"
-    return Sentence(
-        "Next",
-        answers.FLY_ANOTHER,
-        None,
-        f"{text}; one measurement scatters by {in_unit(scatter, unit)}.",
-        links,
-    )
+        text = f"Another flight would improve the quality by {gain}; the same flight repeated scatters by {scatter}."
+        return _next(stop, f"{text}{off}", good=good)
+    text = f"Another flight may improve the quality by {gain}; one measurement scatters by {scatter}."
+    return _next(answers.FLY_ANOTHER, text)
+
+
+def _next(answer: str, text: str, *links: tuple[str, str], good: bool | None = None) -> Sentence:
+    return Sentence("Next", answer, good, text, (*links, ("next", "next experiment")))
 
 
 def _links(found: Examination, failed: list[Check]) -> tuple[tuple[str, str], ...]:
@@ -351,7 +339,7 @@ def _links(found: Examination, failed: list[Check]) -> tuple[tuple[str, str], ..
     links = [
         (places[check.name], check.name.replace("-", " ")) for check in failed[:3] if check.name in places
     ]
-    return (*links, ("checks", "all checks"))
+    return (*links, ALL_CHECKS)
 
 
 def _number(value: float | None) -> str:

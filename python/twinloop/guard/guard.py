@@ -172,6 +172,9 @@ class Guard:
                 f"Guard.command, state: expected {self.signals.n_x} numbers{or_measured(self.signals)}, found shape"
                 f" {reading.shape}."
             )
+        if not self.tripped:
+            # Whatever it trips on, the record ends with what was read then.
+            self._last = None if self._sensors.missing(reading).any() else reading.copy()
         goal = self._goal(target)
         own = None
         if not self.tripped:
@@ -271,7 +274,6 @@ class Guard:
         """Trips on the first thing that is wrong."""
         states = self.signals.states
         missing, wrong = self._sensors.missing(reading), self._untrusted(reading)
-        self._last = None if missing.any() else reading.copy()
         if wrong.any():
             i = int(np.argmax(wrong))
             if not missing[i]:

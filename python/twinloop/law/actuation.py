@@ -156,6 +156,11 @@ class Actuation(Recorded, kind="actuation"):
         )
         return Actuation(tuple(Actuator(*actuator) for actuator in model.actuators), tuple(hidden))
 
+    @property
+    def remembers(self) -> bool:
+        """Whether commands of earlier periods act in a later one, too."""
+        return bool(self.hidden) or not all(actuator.direct for actuator in self.actuators)
+
     def effects(self, signals: Signals, commands: Floats) -> list[Floats]:
         """What arrives of commands (n, n_u), then hidden states that they fill, within each period."""
         scales = np.array([command.size for command in signals.commands])

@@ -357,11 +357,9 @@ class Judge:
         flights = self.flights(genes, excitation, ends)
         return Judged(*qualities(members, flights, self.quality.engine, bounded, workers=self.workers))
 
-    def stable_members(
-        self, members: Sequence[_core.Model], genes: Floats, excitation: Floats | None = None
-    ) -> list[_core.Model]:
+    def stable_members(self, members: Sequence[_core.Model], genes: Floats) -> list[_core.Model]:
         """Members that diverge on fewer than half of the flights; the best one in any case."""
-        return list(compress(members, self.quiet(members, genes, excitation).stable))
+        return list(compress(members, self.quiet(members, genes).stable))
 
     def noise(self, sds: Floats, draws: int, reports: Reports) -> Floats | None:
         """The same draws of sensor noise for everybody, as it is given (draws, n + 1, n_x); None for a quiet flight."""

@@ -67,6 +67,28 @@ class Store:
             yield connection
 
     @contextmanager
+    def snapshot(self) -> Iterator[Connection]:
+        """All that is read in it is of one moment, whatever others write meanwhile.
+
+        A file shows so much in any transaction. A server shows each statement what was written by then, if it is not
+        asked for more: of an experiment that is told between two of them it would show the run without its test.
+
+        Yields:
+            A connection.
+
+        Raises:
+            StoreFailure: the database refuses.
+        """
+        if self.path is not None:
+            with self.transaction() as connection:
+                yield connection
+            return
+        with self.sentences(), self.engine.connect() as connection:
+            alike = connection.execution_options(isolation_level="REPEATABLE READ")
+            with alike.begin():
+                yield alike
+
+    @contextmanager
     def sentences(self) -> Iterator[None]:
         """Tells failures of the database as what they mean to a person."""
         from sqlalchemy.exc import SQLAlchemyError

@@ -98,7 +98,7 @@ def found(store: Store, name: str | None) -> Stored | None:
 
     from twinloop.store.schema import campaigns, checkpoints, sessions
 
-    with store.transaction() as connection:
+    with store.snapshot() as connection:
         if name is None:
             name = _only_name(connection, store)
         row = connection.execute(select(campaigns).where(campaigns.c.name == name)).one_or_none()

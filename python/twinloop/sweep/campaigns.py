@@ -93,9 +93,9 @@ def _stored(job: Job, asked: Campaign, store: str | Path) -> Campaign:
     campaign = Campaign.load(store, job.name, read_only=True, threads=1, progress=None)
     where = f"Sweep, store {shown_name(store)}"
     check_setup(campaign.setup, asked.setup, f"{where}: expected the campaign {job.name!r} of this sweep")
-    if len(campaign.experiments) + len(campaign.failures) != job.experiments:
+    if campaign.runs != job.experiments:
         raise InvalidInput(
             f"{where}: expected the campaign {job.name!r} with {job.experiments} experiments, found"
-            f" {len(campaign.experiments)}; choose another store."
+            f" {campaign.runs}; choose another store."
         )
     return campaign

@@ -1,4 +1,6 @@
-"""Which plants methods may be tuned on, and which are only reported on. Stated before any campaign was flown on them.
+"""Which plants methods may be tuned on, and which are reported on. Stated before any campaign was flown on them.
+
+The second half is no longer unseen: docs/zoo.md says what was developed on it since.
 
 Both halves have each kind: a built-in vehicle, one of RotorPy, two rigid bodies, an aircraft, an environment of
 Gymnasium, linked bodies, a chemical, a biological and a thermal or fluid system, and motors and masses with a

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 import twinloop as tl
 from logged_flights import GAINS, flown, new_campaign
 from twinloop.campaign import standing
+from twinloop.campaign.data.excited import Excited, as_excited
 from twinloop.campaign.data.mistaken import flight_of
-from twinloop.campaign.excited import Excited, as_excited
+from twinloop.campaign.withdrawing import _made_by
 from twinloop.errors import RemarkWarning
 
 OTHERS = {"angle.kp": 3.0, "angle.ki": 1.0, "angle.kd": 0.4}
@@ -94,6 +95,31 @@ def test_once_it_is_withdrawn_and_told_as_what_it_is_nothing_is_said():
     campaign.tell(second, flown(second))
     assert all(run.quality is not None for run in campaign.experiments)
     assert "other-test" not in {remark.code for remark in campaign.twin.remarks}
+
+
+def test_a_test_that_waits_is_among_those_that_may_have_been_flown():
+    campaign = new_campaign()
+    first = campaign.test(GAINS)
+    campaign.tell(first, flown(first))
+    waits = campaign.ask()
+    with pytest.warns(RemarkWarning, match=f"told as test {first.number} is a flight of test {waits.number}"):
+        campaign.tell(first, flown(waits, seed=1))
+    # What was asked for since changes nothing of it, nor does what is withdrawn.
+    campaign.ask()
+    campaign.withdraw(campaign.experiments[0], "another rig")
+    for each in (campaign, tl.Campaign.from_record(campaign.to_record())):
+        assert [run.replayed.flown.number for run in each.experiments] == [waits.number]
+
+
+def test_a_test_that_was_asked_for_afterwards_is_not_among_them():
+    campaign = new_campaign()
+    first, second = campaign.test(GAINS), campaign.test(OTHERS)
+    campaign.tell(first, flown(first))
+    campaign.tell(second, flown(second))
+    campaign.withdraw(second, "another rig")
+    campaign.ask()
+    book = campaign._book
+    assert [_made_by(book.recorded[place], place, book) for place in (0, 1)] == [1, 2]
 
 
 def test_the_latest_test_that_was_told_is_among_those_that_may_have_been_flown():

@@ -113,6 +113,7 @@ def test_closed_loops_and_what_noise_does_are_those_of_python_control(good):
 
 def test_curves_of_a_loop_reach_the_sensitivity_of_its_margins(good):
     found = good.examine()
+    assert len(found.loops) == good.signals.n_u
     for curves, margins in zip(found.loops, found.margins.nominal, strict=True):
         assert curves.sensitivity[0].max() == pytest.approx(margins.sensitivity, rel=0.02)
         assert len(curves.open) == 1 + len(good.twin.members)

@@ -17,7 +17,9 @@ SCALES = np.array([state.scale for state in BODY.states])
 def angles(signals, runs):
     """The chains of the three angles, with a first guess of their noise."""
     every = chains(signals, "acceleration", guessed_noise(runs, SCALES))
-    return [given_noise(chain, signals) for chain in every if chain.output is None]
+    found = [given_noise(chain, signals) for chain in every if chain.output is None]
+    assert [chain.states for chain in found] == [(0,), (1,), (2,)]
+    return found
 
 
 @pytest.mark.parametrize("noise", [1e-4, 1e-3, 1e-2])

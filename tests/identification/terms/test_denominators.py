@@ -25,7 +25,9 @@ def test_accelerations_that_equations_of_joints_are_solved_to_are_no_quotients()
     """They are over 1 + Σ w φ as well; priced as such, each cost the whole length of its numerator."""
     pool = Pool(4)
     matrix = [[{2: 0.3}, {3: 0.2}], [{3: 0.7}, {}]]
-    for node in solution(pool, matrix, [{0: 1.5, 1: -2.0}, {1: 4.0}]):
+    nodes = solution(pool, matrix, [{0: 1.5, 1: -2.0}, {1: 4.0}])
+    assert len(nodes) == 2
+    for node in nodes:
         assert node is not None
         assert pool[node[0]].operation == "/"
         assert quotient(pool, node[0]) is None

@@ -1,6 +1,6 @@
 //! A chain: a state that a sum of features drives, its integral, the integral of that; how they move in a period.
 
-use super::whitening::Linear;
+use super::linear::Linear;
 use crate::error::{Result, invalid};
 use crate::model::Form;
 

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::chain::{Chain, LONGEST, Motion};
 use super::gram::Record;
+use super::linear::Linear;
 use super::noise::Noise;
-use super::whitening::{Linear, Whitening};
+use super::whitening::Whitening;
 
 /// −2 log of the likelihood, up to a constant, of the records' residuals ((n + 1) × states each) if only noise made them.
 pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noise: &Noise) -> f64 {

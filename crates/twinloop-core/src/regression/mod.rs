@@ -3,6 +3,7 @@
 mod chain;
 mod gram;
 mod likelihood;
+mod linear;
 mod noise;
 mod problem;
 mod subset;

@@ -4,9 +4,8 @@
 //! once neither is right; the innovations of a Kalman filter are white for any share of the two, and because the filter
 //! is linear it can be run over each feature's own response as well as over the readings (Harvey 1989, chapter 3).
 
-use std::ops::{Add, Mul};
-
 use super::chain::{Chain, LONGEST};
+use super::linear::{Linear, product};
 use super::noise::Noise;
 use crate::linear_algebra::{Small, congruent, inverse_root};
 
@@ -181,21 +180,6 @@ impl Reading<'_> {
             *correction = product(row, innovation);
         }
     }
-}
-
-/// What the observer's step is linear in: a number, or one in each of several lanes.
-pub(crate) trait Linear: Copy + Add<Output = Self> + Mul<f64, Output = Self> {}
-impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Linear for T {}
-
-/// Sum of a row times a column, first entry first.
-#[inline(always)]
-fn product<T: Linear>(row: &[f64], column: &[T]) -> T {
-    let row = &row[..column.len()];
-    let mut sum = column[0] * row[0];
-    for l in 1..column.len() {
-        sum = sum + column[l] * row[l];
-    }
-    sum
 }
 
 /// The covariance after a reading, (1 − K H) P (1 − K H)ᵀ + K R Kᵀ (Joseph 1968). The shorter P − W Wᵀ loses P to rounding

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.elementary import product
+from twinloop.campaign.data.excited import Excited, as_excited, given_in_spans, hows, span_of
 from twinloop.campaign.data.mistaken import flight_of
-from twinloop.campaign.excited import Excited, as_excited, given_in_spans, hows, span_of
 from twinloop.controllers import PID, StateFeedback, UnboundFamily
 from twinloop.controllers.riccati import solve_linear
 from twinloop.identification.records import Run, guessed_noise
@@ -65,6 +65,8 @@ RIDGE = 1e-13
 """Added to normal equations of columns of size 1."""
 SAME = 0.02
 """Share of a gain, or of its range if that is less, within which it is not named as another one."""
+NOTHING = 1e-4
+"""Share of its range by which a gain is not named as another one in any case: what is found for 0 is hardly ever 0."""
 BEYOND = 1.0
 """Ranges of a gain outside its bounds up to which it is believed; one that has no negative values has none there."""
 
@@ -98,7 +100,11 @@ class FlownOtherwise(Replay):
         return [
             f"{gain.name} about {found:.3g} for {wanted:.3g}"
             for gain, wanted, found in pairs
-            if abs(found - wanted) > SAME * min(gain.high - gain.low, max(abs(wanted), abs(found)))
+            if abs(found - wanted)
+            > max(
+                SAME * min(gain.high - gain.low, max(abs(wanted), abs(found))),
+                NOTHING * (gain.high - gain.low),
+            )
         ]
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.excited import apart
 from twinloop.campaign.data.righted import LITTLE
 from twinloop.campaign.data.sent import sent_and_asked
-from twinloop.campaign.excited import apart
 from twinloop.campaign.history import Experiment
 from twinloop.law.levels import Levels, in_words, nearest
 from twinloop.remarks import Remark, note

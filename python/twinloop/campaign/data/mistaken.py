@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from twinloop.campaign.excited import NEARER, SEEN, Excited, as_excited, hows, off_from
+from twinloop.campaign.data.excited import NEARER, SEEN, Excited, as_excited, hows, off_from
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 

@@ -9,8 +9,8 @@ from itertools import chain, combinations, product
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.excited import NEARER, apart, as_excited, excited, given, hows
 from twinloop.campaign.data.odd_one_out import UNITS
-from twinloop.campaign.excited import NEARER, apart, as_excited, excited, given, hows
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory

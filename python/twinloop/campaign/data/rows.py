@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import enumerated
-from twinloop.campaign.excited import NEARER, SEEN, as_excited, given_in_spans, hows, span_of
+from twinloop.campaign.data.excited import NEARER, SEEN, as_excited, given_in_spans, hows, span_of
 from twinloop.remarks import Remark, serious
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory

@@ -8,6 +8,17 @@ from itertools import chain, combinations, product
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.excited import (
+    NEARER,
+    Excited,
+    apart,
+    as_excited,
+    excited,
+    given,
+    hidden,
+    hows,
+    span_of,
+)
 from twinloop.campaign.data.righted import (
     LITTLE,
     Change,
@@ -20,17 +31,6 @@ from twinloop.campaign.data.righted import (
     with_state,
 )
 from twinloop.campaign.data.rows import late_commands
-from twinloop.campaign.excited import (
-    NEARER,
-    Excited,
-    apart,
-    as_excited,
-    excited,
-    given,
-    hidden,
-    hows,
-    span_of,
-)
 from twinloop.campaign.history import Experiment
 from twinloop.remarks import Remark, note, serious
 from twinloop.test import Test

@@ -21,6 +21,8 @@ FREQUENCIES = 160
 """At which loops are drawn, in equal ratios."""
 SLOWEST = 1e-3
 """Lowest of them, as a share of half the frequency of the periods."""
+SUMMED = 2048
+"""Frequencies over which the spectrum of a command's noise is summed."""
 FAR = 1000.0
 """Ranges of a command between its bounds and those of a command without any."""
 
@@ -159,21 +161,20 @@ def closed_curves(closed: Loops, setup: Setup, noise: Noise | None) -> ClosedCur
     )
 
 
-def noise_of_commands(closed: Loops, sensors: Floats, count: int = 2048) -> Floats:
+def noise_of_commands(closed: Loops, sensors: Floats) -> Floats:
     """Standard deviation that white noise of the sensors causes in each command, while no bound is met.
 
     Args:
         closed: the loops of a twin.
         sensors: standard deviation of each state's readings (n_x,), in its unit.
-        count: frequencies over which the spectrum is summed (Parseval).
 
     Returns:
         One a command (n_u,), in its unit; infinite where the loops are not stable.
     """
     if not (np.abs(closed.closed_poles()) < 1.0).all():
         return np.full(len(closed.controller.D), np.inf)
-    # Middles of even parts of the upper half of the circle.
-    frequencies = (np.arange(count) + 0.5) * np.pi / count / closed.dt
+    # Middles of even parts of the upper half of the circle: the spectrum is summed over them (Parseval).
+    frequencies = (np.arange(SUMMED) + 0.5) * np.pi / SUMMED / closed.dt
     gains = np.abs(closed.closed(frequencies)[0]) * sensors
     return np.asarray(np.sqrt(np.square(gains).sum(axis=2).mean(axis=0)))
 

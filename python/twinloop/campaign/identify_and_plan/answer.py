@@ -133,7 +133,7 @@ class Answer:
             workers: how the work is carried out.
 
         Returns:
-            None where the twin diverges on what it was learnt from: of such a one that is said already.
+            Each; none where the twin diverges on what it was learnt from: of such a one that is said already.
         """
         if not np.isfinite(self.identified.chi_squared):
             return []

@@ -76,16 +76,33 @@ class EstimationData:
     """What is learnt from, and held against what is learnt.
 
     Args:
-        flights: without single readings that are wrong.
+        experiments: as they were told, or as far as they were inside their envelope.
+        flights: the same without single readings that are wrong.
         selected: those, or parts of them, that are learnt from.
         identify: identification of these; what it lacks are options and a number.
         answered: holds what was identified against the flights.
     """
 
+    experiments: Sequence[Experiment]
     flights: Sequence[Experiment]
     selected: Sequence[Selected]
     identify: Callable[..., Identified]
     answered: Callable[..., Answer]
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """An answer beside what it was learnt from.
+
+    Args:
+        answer: held against the flights.
+        data: that it was learnt from.
+        invalid: whether it does not explain the flights, or explains them and is wild.
+    """
+
+    answer: Answer
+    data: EstimationData
+    invalid: bool
 
 
 @dataclass(frozen=True)
@@ -121,47 +138,29 @@ class Learner:
         """
         experiments = len(book.experiments)
         needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
-        data = self._data_of(book.experiments)
         earlier = None if asked is None else asked.identified
-        begun = under_way
-
-        def kept(so_far: UnderWay) -> None:
-            nonlocal begun
-            begun = so_far
-            keep(so_far)
-
-        answer = data.answered(
-            data.identify(
-                self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=kept
-            )
-        )
-        if not answer.explained and self.options.earlier_twin and earlier is not None:
-            answer = or_known_before(answer, earlier, data.answered)
-        invalid, learnt_of = self._invalidated(answer, data), book.experiments
-        if invalid and self.options.inside:
-            found = self._inside(book.experiments, earlier)
-            if found is not None:
-                (data, answer, begun), learnt_of = found, inside(book.experiments)
-                invalid = self._invalidated(answer, data)
+        found, begun = self._of_all(book.experiments, earlier, under_way, keep)
         if earlier is not None:
-            again = cache(partial(self._known_again, data, earlier, begun))
-            if not answer.explained and self.options.earlier_twin:
-                answer = or_known_again(answer, again())
-                invalid = self._invalidated(answer, data)
-            tamer = self._tamer(answer, invalid, earlier, again, data) if self.options.tame else None
-            if tamer is not None:
-                answer, invalid = tamer, self._invalidated(tamer, data)
+            found = self._or_tuned_again(found, earlier, begun)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
-        if self.options.plain != self.options and invalid:
-            rough = with_remark(data.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
-            answer, two = self._of_two(answer, data.answered(rough, number=2), two, data)
-        if asked is not None and self.options.earlier_twin and not answer.explained:
-            answer = or_foretold(answer, asked.identified, asked.experiments, data.answered)
-        odd = self._contradicting(answer, learnt_of)
+        if self.options.plain != self.options and found.invalid:
+            found, two = self._of_two(found, two, experiments)
+        if asked is not None and self.options.earlier_twin and not found.answer.explained:
+            answered = found.data.answered
+            foretold = or_foretold(found.answer, asked.identified, asked.experiments, answered)
+            if foretold is not found.answer:
+                found = self._judged(foretold, found.data)
+        answer, data = found.answer, found.data
         identified = answer.identified
-        model = None if earlier is None else earlier.model
         lesson = lesson_of(
-            answer, is_rough(identified), book, data.flights, data.selected, model, odd, self.workers
+            answer,
+            is_rough(identified),
+            book,
+            data.flights,
+            data.selected,
+            None if earlier is None else earlier.model,
+            self._contradicting(found),
+            self.workers,
         )
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -176,14 +175,49 @@ class Learner:
             models=(*models, identified.model),
             two_laws=two.laws,
             rough=two.rough,
-            explained=not invalid,
+            explained=not found.invalid,
         )
         return replace(
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
         )
 
-    def _contradicting(self, answer: Answer, experiments: Sequence[Experiment]) -> Odd | None:
+    def _of_all(
+        self,
+        experiments: Sequence[Experiment],
+        earlier: Identified | None,
+        under_way: UnderWay | None,
+        keep: Callable[[UnderWay], None],
+    ) -> tuple[Judged, UnderWay | None]:
+        """What all flights teach, or as far as they were inside their envelope; and how far its search has come."""
+        data, begun = self._data_of(experiments), under_way
+
+        def kept(so_far: UnderWay) -> None:
+            nonlocal begun
+            begun = so_far
+            keep(so_far)
+
+        identified = data.identify(
+            self.options, iteration=len(experiments), earlier=earlier, under_way=under_way, keep=kept
+        )
+        answer = data.answered(identified)
+        if not answer.explained and self.options.earlier_twin and earlier is not None:
+            answer = or_known_before(answer, earlier, data.answered)
+        found = self._judged(answer, data)
+        within = self._inside(experiments, earlier) if found.invalid and self.options.inside else None
+        return (found, begun) if within is None else within
+
+    def _or_tuned_again(self, found: Judged, earlier: Identified, begun: UnderWay | None) -> Judged:
+        """An answer, or the law known before, tuned on all flights: where that explains them, or is tamer."""
+        data = found.data
+        again = cache(partial(self._known_again, data, earlier, begun))
+        if not found.answer.explained and self.options.earlier_twin:
+            found = self._judged(or_known_again(found.answer, again()), data)
+        tamer = self._tamer(found, earlier, again) if self.options.tame else None
+        return found if tamer is None else self._judged(tamer, data)
+
+    def _contradicting(self, found: Judged) -> Odd | None:
         """The log that contradicts all others, where the law that explains them was made for it."""
+        answer, experiments = found.answer, found.data.experiments
         odd = odd_log(experiments, self.setup.signals) if answer.explained else None
         if odd is None:
             return None
@@ -196,6 +230,7 @@ class Learner:
         selected = learnt_from(experiments, self.options.most_readings, self.setup.signals)
         flights = without_wrong_readings(experiments, self.setup.signals)
         return EstimationData(
+            experiments,
             flights,
             selected,
             self._identification(selected, self._drawn(experiments, 3)),
@@ -204,8 +239,8 @@ class Learner:
 
     def _inside(
         self, experiments: Sequence[Experiment], earlier: Identified | None
-    ) -> tuple[EstimationData, Answer, UnderWay | None] | None:
-        """What is told, learnt and searched of flights as far as they were inside their envelope.
+    ) -> tuple[Judged, UnderWay | None] | None:
+        """What is learnt and searched of flights as far as they were inside their envelope.
 
         None where none has left it for good, or where so little is left of them that more is lost than won.
         """
@@ -219,19 +254,20 @@ class Learner:
         answer = data.answered(found, number=5)
         if not (answer.explained or enough_inside(experiments, kept)):
             return None
-        return data, answer, begun[-1] if begun else None
+        return self._judged(answer, data), begun[-1] if begun else None
 
-    def _invalidated(self, answer: Answer, data: EstimationData) -> bool:
-        """Whether a law does not explain the flights; or only what may be a model error explains them, and it is wild.
+    def _judged(self, answer: Answer, data: EstimationData) -> Judged:
+        """An answer, invalid where it does not explain the flights, or what may be a model error does and it is wild.
 
         Whatever may disturb explains much. A law that needs it, and diverges under most controllers of the box, such as
         one with a hidden state that stands in for a load behind a gap, is no better than a linear one for that.
         """
         if not answer.explained:
-            return True
+            return Judged(answer, data, True)
         everywhere = self._drawn(data.flights, 0)
         (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
-        return 2 * lasting < DRAWN and bool(answer.misses(data.flights, self.setup, self.workers))
+        wild = 2 * lasting < DRAWN and bool(answer.misses(data.flights, self.setup, self.workers))
+        return Judged(answer, data, wild)
 
     def _known_again(self, data: EstimationData, known: Identified, begun: UnderWay | None) -> Answer:
         """The law known before, tuned on all flights: wrong and late readings, and the form, are of the search anew."""
@@ -242,16 +278,10 @@ class Learner:
         )
         return data.answered(identified, number=4)
 
-    def _tamer(
-        self,
-        answer: Answer,
-        invalid: bool,
-        known: Identified,
-        known_again: Callable[[], Answer],
-        data: EstimationData,
-    ) -> Answer | None:
+    def _tamer(self, found: Judged, known: Identified, known_again: Callable[[], Answer]) -> Answer | None:
         """The law known before, tuned on all flights, where it is tamer than that of an answer and follows nearly."""
-        everywhere = self._drawn(data.flights, 2)
+        answer, invalid = found.answer, found.invalid
+        everywhere = self._drawn(found.data.flights, 2)
 
         def lasting(other: Identified) -> Lasting:
             models = [answer.identified.model, other.model]
@@ -269,14 +299,14 @@ class Learner:
         """Controllers that are drawn from the whole box of gains for one of the looks at them (DRAWN, size)."""
         return drawn_controllers(self.setup, Unit(self.setup.seed).part(len(flights), 4, number))
 
-    def _of_two(
-        self,
-        answer: Answer,
-        rough: Answer,
-        before: Two,
-        data: EstimationData,
-    ) -> tuple[Answer, Two]:
-        """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds."""
+    def _of_two(self, found: Judged, before: Two, experiments: int) -> tuple[Judged, Two]:
+        """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds.
+
+        Which of them it is, neither is valid.
+        """
+        answer, data = found.answer, found.data
+        identified = with_remark(data.identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
+        rough = data.answered(identified, number=2)
         if self.options.earlier_twin and before.rough is not None:
             rough = or_lasted_before(rough, before.rough, data.answered)
         both = TwoLaws(len(data.flights), answer.identified.model, rough.identified.model)
@@ -284,7 +314,8 @@ class Learner:
         foretold = better_foretold(now.laws, data.flights, self.setup.limits, self.workers)
         laws = [both.nonlinear, both.linear]
         lasting = lasting_under(laws, self.setup, self._drawn(data.flights, 1), self.workers)
-        return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
+        better = better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting])
+        return replace(found, answer=better), now
 
     def _identification(self, selected: Sequence[Selected], everywhere: Floats) -> partial[Identified]:
         """Identification of what is learnt from; what it lacks are options and a number.

@@ -104,7 +104,7 @@ class IdentifyAndPlan:
         memory = Memory.from_record(record, self.setup.signals, self.setup.family)
         for learnt in (memory.asked, memory.latest):
             if learnt is not None:
-                book.first(learnt.experiments)
+                book.check_known(learnt.experiments)
         self.memory = memory
 
     @property

@@ -22,20 +22,20 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
-from twinloop.faces.cautions import advised_to_stop, not_reliable, serious_of, thin_margins
+from twinloop.faces.cautions import advised_to_stop, not_reliable, serious_of
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.dashboard.desk import Desk, to_be_learnt
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.ends import ends, varying_words
-from twinloop.faces.opening import changed_since, fields_beside
+from twinloop.faces.opening import changed_since
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import (
+    Sheet,
     excitation_words,
     hold_back_ranges,
     hold_back_words,
     reason,
-    sheet,
     unknown_risk,
 )
 from twinloop.faces.telling import is_chosen, numbered, to_be_flown
@@ -272,25 +272,9 @@ class Pages:
         campaign = self.desk.agreeing(name)
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test) if campaign.history else None
-        against = serious_of(latest_lesson(campaign))
-        waiting, stored_as = to_be_flown(campaign), self.desk.stored_as(name)
+        stored_as = self.desk.stored_as(name)
         file = columns_file(stored_as, test).name
-        advice, flown, chosen = advised_to_stop(campaign), campaign.runs > 0, is_chosen(campaign, test)
-        called, margins = fields_beside(self.desk.store), thin_margins(campaign, test)
-        return sheet(
-            stored_as,
-            test,
-            predicted,
-            file,
-            campaign.setup,
-            against,
-            waiting,
-            advice,
-            flown,
-            chosen,
-            called,
-            margins,
-        )
+        return Sheet.of(campaign, stored_as, test, predicted, file, advised_to_stop(campaign)).text
 
     def _columns(self, name: str, number: int) -> tuple[str, str]:
         """The text of a test's file, and what the file is called."""

@@ -20,8 +20,9 @@ TIMES = 3.0
 """Standard deviation of what a term moves, in units of all that moves its chain."""
 
 OF_ALL = 0.95
+"""Share of all changes that is compared with: so few readings jump that this quantile is none of theirs."""
 BEYOND = 3.0
-"""A change more than so many times as large as such a share of all changes is a reading that jumped."""
+"""A change more than so many times as large as that share of all changes is a reading that jumped."""
 
 
 def precisions(problem: Problem, chain: Chain, terms: Sequence[int]) -> Floats:

@@ -22,7 +22,7 @@ def actuation_c(law: Law, name: str, precision: str) -> list[str]:
         "{",
         f"    static const real factors[{n_u}] = {listed([1.0 / c.size for c in law.signals.commands], precision)};",
     ]
-    if not hidden and all(actuator.direct for actuator in actuators):
+    if not law.actuation.remembers:
         return [
             *lines,
             "    (void)memory;",

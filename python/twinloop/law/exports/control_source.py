@@ -117,6 +117,5 @@ def control_source(law: Law) -> str:
     text = text.replace(
         "It needs nothing but Python.", "`system` is a nonlinear system of python-control.", 1
     )
-    direct = not law.actuation.hidden and all(each.direct for each in law.actuation.actuators)
-    remembered = _NOTHING_REMEMBERED if direct else _REMEMBERED
+    remembered = _REMEMBERED if law.actuation.remembers else _NOTHING_REMEMBERED
     return "\n".join([text, remembered, _LATE if any(law.offsets) else _IN_TIME, _SYSTEM])

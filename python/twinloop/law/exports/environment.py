@@ -129,7 +129,8 @@ def environment(
                 run = twin.simulate_commands(self.begun, np.array([*self.sent, command]))
                 states = run.states if run.true_states is None else run.true_states
                 return states[-1] if run.steps > len(self.sent) else np.full(signals.n_x, np.nan)
-            return twin.predict(self.state, command, past=np.array(self.sent) if self.sent else None)
+            past = np.array(self.sent) if self.sent and twin.law.actuation.remembers else None
+            return twin.predict(self.state, command, past=past)
 
         def _reward(self, before: Floats, command: Floats, after: Floats) -> float:
             if reward is not None:

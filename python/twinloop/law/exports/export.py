@@ -59,6 +59,10 @@ FMUS = {"fmu3": 3, "fmu2": 2}
 UNFIT = frozenset("\"'<>\\")
 """What the name of a file may not have: C includes it between quotes."""
 PRECISIONS = ("double", "float")
+FORCED = "Exported by force: its checks, and a comparison on flights, were left out."
+"""What a file says of itself that was: whoever is handed it cannot know."""
+COMMENTS = {".py": "# {}\n", ".c": "/* {} */\n", ".h": "/* {} */\n", ".tex": "% {}\n"}
+"""A line of its own in the files that are texts, by their suffixes; a twin as JSON has its remarks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +156,25 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
         InvalidInput: another precision.
         NotAvailable: the export does not give the twin's numbers, or cannot be checked.
     """
+    contents = _contents(source, kind, name, precision)
+    return contents if source.check else by_force(contents)
+
+
+def by_force(contents: Contents) -> Contents:
+    """The same, where each text says that it was exported by force.
+
+    Args:
+        contents: by suffix.
+    """
+    return {
+        suffix: COMMENTS[suffix].format(FORCED) + content
+        if suffix in COMMENTS and isinstance(content, str)
+        else content
+        for suffix, content in contents.items()
+    }  # type: ignore[return-value]
+
+
+def _contents(source: Source, kind: str, name: str, precision: str) -> Contents:
     law, flights = source.law, source.flights
     if precision not in PRECISIONS:
         raise unknown("precision", precision, PRECISIONS)
@@ -193,7 +216,7 @@ def _unit(source: Source, version: int, name: str) -> bytes:
     """An FMU; by force also without a binary."""
     law, flights = source.law, source.flights
     start = flights[0].states[0] if flights else np.zeros(law.signals.n_x)
-    unit = unit_of(version, law, name, start)
+    unit = unit_of(version, law, name, start, "" if source.check else FORCED)
     with TemporaryDirectory(prefix="fmu-") as folder:
         try:
             library, place = built(unit, Path(folder))

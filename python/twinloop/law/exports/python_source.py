@@ -188,8 +188,7 @@ def python_source(law: Law) -> str:
         A module with `simulate(initial_state, commands)`, a class `Twin` with `reset` and `step`, and what the sensors
         read: `readings(states)` and a class `Sensors` with `reset` and `read`.
     """
-    actuators, hidden = law.actuation.actuators, law.actuation.hidden
-    direct = not hidden and all(actuator.direct for actuator in actuators)
+    direct = not law.actuation.remembers
     head = [
         f'"""A twin of {", ".join(law.signals.state_names)}, learnt by Twinloop {__version__}.',
         "",

@@ -78,7 +78,9 @@ def late_states(law: Law) -> list[int]:
     return [place for place, offset in enumerate(law.offsets) if offset != 0.0]
 
 
-def model_description(version: int, law: Law, name: str, token: str, listed: Sequence[Variable]) -> bytes:
+def model_description(
+    version: int, law: Law, name: str, token: str, listed: Sequence[Variable], said: str = ""
+) -> bytes:
     """modelDescription.xml.
 
     Args:
@@ -87,6 +89,7 @@ def model_description(version: int, law: Law, name: str, token: str, listed: Seq
         name: of the model, which is its identifier in C, too.
         token: by which its binary knows it.
         listed: its variables.
+        said: against it, in a sentence.
 
     Returns:
         UTF-8.
@@ -98,7 +101,7 @@ def model_description(version: int, law: Law, name: str, token: str, listed: Seq
             "fmiVersion": f"{version}.0",
             "modelName": name,
             ("instantiationToken" if third else "guid"): token,
-            "description": "A twin, learnt from flights",
+            "description": f"A twin, learnt from flights. {said}".strip(),
             "generationTool": f"Twinloop {__version__}",
             "variableNamingConvention": "flat",
             **({} if third else {"numberOfEventIndicators": "0"}),

@@ -56,7 +56,7 @@ class Unit:
     files: Mapping[str, bytes]
 
 
-def unit_of(version: int, law: Law, name: str, start: Floats) -> Unit:
+def unit_of(version: int, law: Law, name: str, start: Floats, said: str = "") -> Unit:
     """All of an FMU but its binary.
 
     Args:
@@ -64,6 +64,7 @@ def unit_of(version: int, law: Law, name: str, start: Floats) -> Unit:
         law: of the twin.
         name: a name that functions in C may begin with.
         start: state where it begins unless another is set (n_x,).
+        said: against it, in a sentence.
     """
     low, high = np.array([command.bounds for command in law.signals.commands]).T
     rest = np.clip(np.zeros(law.signals.n_u), low, high)
@@ -80,7 +81,7 @@ def unit_of(version: int, law: Law, name: str, start: Floats) -> Unit:
     content = "\n".join([*texts.values(), repr([(each.name, each.attributes) for each in listed])])
     token = f"{{{uuid5(NAMESPACE_URL, content)}}}"
     texts["fmi-twin.h"] = _header(law, name, token, start, rest)
-    found = {"modelDescription.xml": model_description(version, law, name, token, listed)}
+    found = {"modelDescription.xml": model_description(version, law, name, token, listed, said)}
     found |= {f"sources/{file}": text.encode() for file, text in texts.items()}
     if version == 3:
         found["sources/buildDescription.xml"] = build_description(name)

@@ -12,9 +12,9 @@ from lives import SIGNALS
 from oracles import same_bits
 from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign.campaign_file import read_file, template
+from twinloop.campaign.data.excited import Excited, as_excited, excited
 from twinloop.campaign.data.sent import other_commands
 from twinloop.campaign.examination.log_check import against
-from twinloop.campaign.excited import Excited, as_excited, excited
 
 TORQUE = SIGNALS.commands[0].bounds
 
