@@ -119,6 +119,10 @@ REFUSED = {
     "an integral twice": (lambda: StateFeedback(None, (0, 1), None, ["angle"] * 2), "each once"),
     "bounds the wrong way round": (lambda: StateFeedback(None, (1, 0)), "low < high"),
     "an output that is no mixer": (lambda: StateFeedback(None, (0, 1), 3), "Mixer or None"),
+    "an offset without a row": (
+        lambda: Mixer([[1.0, 0.0]], [0.5, 0.5]),
+        "a row of the matrix and an entry of the offset for each command, found 1 and 2",
+    ),
 }
 UNFIT = {
     "an unknown state": (StateFeedback(["angel"], (0, 1)), "did you mean 'angle'"),
@@ -126,6 +130,10 @@ UNFIT = {
     "an unknown gain": (StateFeedback(None, {"angel": (0, 1), "rate": (0, 1)}), "Unknown gain 'angel'"),
     "a missing gain": (StateFeedback(None, {"angle": (0, 1)}), "found none for rate->torque"),
     "a mixer for two commands": (StateFeedback(None, (0, 1), Mixer([[1.0], [1.0]])), "expected the shape"),
+    "an offset in percent": (
+        StateFeedback(None, (0, 1), Mixer([[1.0]], [62.0])),
+        "within its bounds, .* found 62; give it in the unit of the command",
+    ),
 }
 
 

@@ -161,7 +161,7 @@ def test_a_row_of_arrays_is_their_index():
     signals = tl.Signals(SIGNALS.states, SIGNALS.commands, run.t[1] - run.t[0])
     states, late = run.states.copy(), run.t.copy()
     states[50, 0], late[50] = 1e9, late[49]
-    with pytest.raises(tl.InvalidInput, match=r"found 1e\+09 at row 50; cut"):
+    with pytest.raises(tl.InvalidInput, match=r"found 1e\+09 at row 50; check its unit"):
         check_recorded(tl.Trajectory(run.t, states, run.commands), tl.Limits(signals), None)
     with pytest.raises(tl.InvalidInput, match="at row 50; sort") as refused:
         tl.Trajectory(late, run.states, run.commands)

@@ -4,6 +4,7 @@ import html
 import json
 import re
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -11,12 +12,13 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination import checking
+from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.answers import FLY_ANOTHER
 from twinloop.faces.cli import main
 from twinloop.faces.report.page import report_page
 from twinloop.faces.result import summary
 from twinloop.faces.text import render
-from twinloop.faces.verdict import of_next
+from twinloop.faces.verdict import of_next, verdict
 
 pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
 
@@ -72,6 +74,22 @@ def test_a_twin_that_the_report_does_not_trust_is_not_advised_on_in_a_terminal(g
     assert text.count("All checks:") == 1 and "normalised error of" not in text
     assert not re.search(r"\bstop\b", text.split("FLIGHTS")[0] + text.split("CONTROLLER")[1])
     assert "not to be trusted yet, so it cannot say" in " ".join(text.split("ANOTHER EXPERIMENT?")[1].split())
+
+
+@pytest.mark.parametrize(
+    ("misses", "words"),
+    [
+        ((0.3, -1.9, 2.1), "Of the 3 qualities that it predicted, 2 came within 2 of their spreads."),
+        ((0.3,), "The only quality that it predicted came within 2 of its spreads."),
+        ((np.inf,), "The only quality that it predicted did not come within 2 of its spreads."),
+    ],
+)
+def test_of_a_twin_that_fails_it_is_said_what_it_foretold(good, monkeypatch, misses, words):
+    monkeypatch.setattr(checking, "INSIDE", 1.01)
+    monkeypatch.setattr(Examination, "quality_misses", property(lambda found: misses))
+    found = good.examine()
+    (twin, *_) = verdict(found, good.checks(), summary(good, {"name": "p"}, {}))
+    assert not twin.good and twin.text.endswith(words)
 
 
 def test_a_controller_that_is_refused_is_not_one_to_fly_in_a_terminal(hasty):

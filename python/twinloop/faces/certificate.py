@@ -80,11 +80,14 @@ def facts(
     }
     if best is not None and found.step is not None:
         predicted, spread = predicted_quality(best, found.experiments)
+        whole = found.step.steps == best.steps
         result["prediction"] = {
             "kind": quality.kind,
             "unit": quality_unit(quality),
             "quality": predicted,
             "spread": spread,
+            "measured": best.measured,
+            "drawn": quality.flown(found.step, best.target_state) if whole else None,
             "t": found.step.t,
             "states": found.step.states,
             "band": found.step.band,

@@ -114,7 +114,8 @@ def _text(log: Path, found: LogCheck) -> str:
     lines += ["", table(head, rows), ""]
     lines += [f"{'✗' if remark.serious else '○'} {remark.sentence}" for remark in found.remarks]
     lines.append(
-        "The log can be used for learning."
+        "The log can be used for learning. Whether its commands are those of the controller, and whether it is whole,"
+        " is seen when it is told as the flight of a test."
         if found.fit
         else "Correct what is marked ✗ before you use the log."
     )

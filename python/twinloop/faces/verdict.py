@@ -18,6 +18,8 @@ from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
 from twinloop.faces.text.words import every, flown_words, quality_words
 
+NEAR = 2.0
+"""Spreads of a predicted quality within which it came true."""
 ALL_CHECKS = ("checks", "all checks")
 """Where all checks stand, and what to call it."""
 EVIDENCE = {
@@ -130,7 +132,7 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
             )
             text += " an effect"
         return Sentence(
-            "Twin", answers.DO_NOT_TRUST, False, f"{_capital(text)}.{unseen}", _links(found, failed),
+            "Twin", answers.DO_NOT_TRUST, False, f"{_capital(text)}.{unseen}{_foretold(found)}", _links(found, failed),
             _against_twin(found, failed),
         )  # fmt: skip
     text = unseen.strip()
@@ -189,6 +191,18 @@ def _unseen(found: Examination) -> str:
     if last.piece < last.flown.steps:
         pieces = f", begun again at a reading {every([last.piece * found.signals.dt])},"
     return f" {which} the lowest FIT of its free run{pieces} is {fits[worst]:.3g} %, for {state}{inside}."
+
+
+def _foretold(found: Examination) -> str:
+    """How often a quality came out as it was predicted, which a twin may be good for that fails elsewhere."""
+    misses = found.quality_misses
+    if not misses:
+        return ""
+    near = sum(abs(miss) <= NEAR for miss in misses)
+    if len(misses) == 1:
+        came = "came" if near else "did not come"
+        return f" The only quality that it predicted {came} within {NEAR:g} of its spreads."
+    return f" Of the {len(misses)} qualities that it predicted, {near} came within {NEAR:g} of their spreads."
 
 
 def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:

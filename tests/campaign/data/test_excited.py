@@ -63,6 +63,7 @@ def test_how_an_excitation_was_flown_is_seen_in_the_commands(test, noise):
     assert ("excitation", "note") in codes(flown(test, Excited.NOT, noise))
     assert ("excitation", "serious") in codes(flown(test, Excited.WHOLE, noise))
     assert ("excitation", "serious") in codes(flown(test, Excited.TWICE, noise))
+    assert ("excitation", "note") in codes(flown(test, Excited.NEGATED, noise))
     assert "excitation" not in dict(codes(flown(test, noise=noise)))
 
 
@@ -181,7 +182,7 @@ def test_a_flight_counts_as_it_was_flown(how, tmp_path):
     assert run.number == 0 and campaign.status(asked) == "flown"
     assert asked.excitation is not None and asked.hold_back is not None
     assert (run.test.excitation is None) == (how is Excited.NOT)
-    assert (run.test.hold_back is not None) == (how is Excited.HELD_BACK)
+    assert (run.test.hold_back is not None) == (how in (Excited.HELD_BACK, Excited.NEGATED))
     # What was predicted is the quality of the flight that was asked for.
     assert run.test.predicted == (1.0 if how is Excited.HELD_BACK else None)
     # So its own commands, and no others, are those of the record.

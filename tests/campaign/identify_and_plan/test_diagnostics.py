@@ -115,7 +115,7 @@ def test_where_no_rate_is_logged_and_no_law_follows_it_is_said_what_to_log():
     alone = tl.Signals([tl.State("angle", "rad", 1.0)], SIGNALS.commands, DT)
     run = flown()
     run.trajectory = tl.Trajectory(run.trajectory.t, run.trajectory.states[:, 1:2], run.trajectory.commands)
-    for found in (Findings(False), Findings(True, misses=[Miss(0, 1, 0.2, 4.5, False)])):
+    for found in (Findings(False), Findings(True, misses=[Miss(0, (0,), 0.2, 4.5, False)])):
         (remark,) = diagnostics_of([run], alone, STEPS, found)
         assert "No rate of angle is logged" in remark.sentence and "lags=1" in remark.sentence
     assert "lags=1" not in said(flown(), follows=False)[0]
@@ -130,34 +130,35 @@ def remarked(*runs, **found):
 
 def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
     assert remarked(flown(), misses=[]) == []
-    assert remarked(flown(), misses=[Miss(1, 1, 0.2, 4.5, False)]) == [("free-run", True)]
-    assert remarked(flown(), flown(1), misses=[Miss(1, 1, np.inf, np.inf, False)]) == [("free-run", True)]
+    assert remarked(flown(), misses=[Miss(1, (0,), 0.2, 4.5, False)]) == [("free-run", True)]
+    assert remarked(flown(), flown(1), misses=[Miss(1, (1,), np.inf, np.inf, False)]) == [("free-run", True)]
     assert remarked(flown(), unmoved=["yaw_rate"]) == [("unmoved", True)]
     assert remarked(flown(), recurring=["yaw_rate"]) == [("model-error", False)]
     assert remarked(flown(), others=[3]) == [("other-commands", True)]
 
 
 def test_the_states_that_a_free_run_misses_are_named():
-    angle, rate = Miss(1, 1, 0.25, 4.5, False), Miss(2, 2, 0.04, 9.0, True)
+    angle, rate = Miss(1, (0,), 0.25, 4.5, False), Miss(2, (1, 0), 0.04, 9.0, True)
     (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, STEPS, Findings(True, misses=[angle, rate]))
     assert (
         "over the 2 runs so far" in remark.sentence  # a twin of before has not learnt the last
         and "There is an effect that no term describes." in remark.sentence
     )
     assert (
-        "rate on 2 (up to 4 % of its range, 9 times what noise and disturbances explain), angle on 1 (up to 25 %"
-        in remark.sentence
+        "rate on 2 of them, most on log 2 (up to 4 % of its range, 9 times what noise and disturbances explain),"
+        " angle on log 1 (up to 25 %" in remark.sentence
     )
+    rate = Miss(2, (0,), 0.04, 9.0, True)
     (remark,) = diagnostics_of([flown()], SIGNALS, STEPS, Findings(True, misses=[rate]))
     assert "may be an external disturbance or a model error" in remark.sentence
     (remark,) = diagnostics_of(
-        [flown()], SIGNALS, STEPS, Findings(True, misses=[Miss(2, 1, 11.2, 9.0, True)])
+        [flown()], SIGNALS, STEPS, Findings(True, misses=[Miss(2, (0,), 11.2, 9.0, True)])
     )
-    assert "rate on 1 (up to 11 times its range, 9 times what" in remark.sentence
+    assert "rate on log 1 (up to 11 times its range, 9 times what" in remark.sentence
     (remark,) = diagnostics_of(
-        [flown()], SIGNALS, STEPS, Findings(True, misses=[Miss(0, 1, np.inf, np.inf, False)])
+        [flown()], SIGNALS, STEPS, Findings(True, misses=[Miss(0, (0,), np.inf, np.inf, False)])
     )
-    assert "the twin diverges on 1." in remark.sentence
+    assert "the twin diverges on log 1." in remark.sentence
 
 
 def test_what_noise_and_disturbances_explain_is_held_against_no_twin():

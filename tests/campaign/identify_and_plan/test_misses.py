@@ -75,7 +75,11 @@ def test_what_may_be_an_error_of_the_law_explains_nothing_for_certain():
     flown = flights(GUST)
     angle, rate = misses_of(model(), flown, GUSTS, {1: "undecided"}, *BESIDE)
     assert (angle.state, rate.state) == (0, 1) and angle.undecided and rate.undecided
-    assert angle.flights == rate.flights == 3 and 0.03 < angle.share < 1.0 and angle.times > 3.0
+    assert (
+        set(angle.flights) == set(rate.flights) == {0, 1, 2}
+        and 0.03 < angle.share < 1.0
+        and angle.times > 3.0
+    )
     # For certain it is none: then nothing would explain it.
     found = misses_of(model(), flown, GUSTS, {1: "law"}, *BESIDE)
     assert [miss.state for miss in found] == [0, 1] and not any(miss.undecided for miss in found)
@@ -95,7 +99,7 @@ def test_a_state_is_missed_that_is_small_beside_the_others():
     followed = following([wrong], flown, BESIDE[1], BESIDE[2])
     assert not misses_any(wrong, followed, flown, noise, {}, *BESIDE)
     (angle, *_) = misses_of(wrong, flown, noise, {}, *BESIDE)
-    assert angle.state == 0 and angle.flights == 3
+    assert angle.state == 0 and len(angle.flights) == 3
 
 
 def test_a_twin_that_diverges_misses_every_state():

@@ -301,6 +301,10 @@ def test_a_twin_that_does_not_follow_its_flights_is_exported_only_by_force(tmp_p
         twin.export(tmp_path / "twin.py")
     assert not (tmp_path / "twin.py").exists()
     assert twin.export(tmp_path / "twin.py", force=True) == (tmp_path / "twin.py",)
+    # Whoever is handed a file can see that.
+    assert (tmp_path / "twin.py").read_text("utf-8").startswith("# Exported by force: its checks")
+    for kind in ("c", "sympy", "casadi", "latex"):
+        assert "Exported by force" in twin.export(kind, force=True)
     lost = [TestErrors(0, np.inf, np.inf, np.inf, None, np.inf)]
     assert not twin_of(PENDULUM, errors=lost).follows
     assert twin_of(PENDULUM, errors=[TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)]).follows
@@ -717,7 +721,9 @@ def test_what_speaks_against_a_twin_is_a_warning_where_it_is_taken_away_in_pytho
         warnings.simplefilter("error")
         again = tl.load_twin(tmp_path / "twin.json")
         plain = TWINS["acceleration"]()
-        assert again.export("latex", force=True) == plain.export("latex")  # forced, or nothing to be said
+        forced, text = again.export("latex", force=True).split("\n", 1)
+        # Forced, or nothing to be said.
+        assert text == plain.export("latex") and forced.startswith("% Exported by force")
     with pytest.warns(tl.RemarkWarning, match="It misses"):
         again.export("python")
 

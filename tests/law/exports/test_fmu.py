@@ -235,3 +235,4 @@ def test_an_fmu_needs_a_path_a_compiler_and_double_precision(tmp_path, monkeypat
     (path,) = twin.export(tmp_path / "twin.fmu", force=True)
     with zipfile.ZipFile(path) as archive:
         assert not any(file.startswith("binaries/") for file in archive.namelist())
+        assert b"flights. Exported by force: its checks" in archive.read("modelDescription.xml")

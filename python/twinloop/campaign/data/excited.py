@@ -35,6 +35,7 @@ class Excited(Enum):
     WHOLE = "without holding it back"
     NOT = "not at all"
     TWICE = "twice"
+    NEGATED = "with the other sign"
 
 
 def excited(test: Test, run: Trajectory) -> Excited:
@@ -49,7 +50,7 @@ def excited(test: Test, run: Trajectory) -> Excited:
     asked = off_from(test, run)
     if asked <= SEEN * SEEN:
         return Excited.HELD_BACK
-    others = (Excited.WHOLE, Excited.NOT, Excited.TWICE)
+    others = (Excited.WHOLE, Excited.NOT, Excited.TWICE, Excited.NEGATED)
     off = {how: off_from(as_excited(test, how), run) for how in others}
     best = min(off, key=lambda how: off[how])
     return best if off[best] < BETTER * asked else Excited.HELD_BACK
@@ -97,6 +98,8 @@ def as_excited(test: Test, how: Excited) -> Test:
         return test.quiet()
     if how is Excited.TWICE and test.excitation is not None:
         return replace(test, excitation=2.0 * test.excitation, hold_back=None)
+    if how is Excited.NEGATED and test.excitation is not None:
+        return replace(test, excitation=-test.excitation)
     return replace(test, hold_back=None) if how is Excited.WHOLE else test
 
 

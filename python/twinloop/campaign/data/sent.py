@@ -114,7 +114,7 @@ def from_other_controllers(tests: Sequence[int], change: str = "") -> Iterator[R
 
 
 def from_another_excitation(test: Test, run: Trajectory) -> Iterator[Remark]:
-    """That the excitation of a test was not flown, not held back, or flown twice, by the recorded commands.
+    """That the excitation of a test was left out, not held back, doubled or subtracted, by the recorded commands.
 
     Args:
         test: as it was asked for.
@@ -145,6 +145,12 @@ def from_another_excitation(test: Test, run: Trajectory) -> Iterator[Remark]:
             "excitation",
             f"{subject} was flown twice as strong: such a flight may lead further than its sheet"
             " says. The commands of test.controller() have it already: send them as they are.",
+        )
+    elif how is Excited.NEGATED:
+        yield note(
+            "excitation",
+            f"{subject} was subtracted from the commands instead of added: check the sign with which your program adds"
+            " it, and the signs of the commands.",
         )
 
 

@@ -272,20 +272,22 @@ class Examination:
     # The controller
 
     @property
+    def quality_misses(self) -> tuple[float, ...]:
+        """Predicted minus flown quality of each flight that has both, in predicted spreads; infinite: it diverged."""
+        return tuple(
+            (test.predicted - run.quality) / test.spread if math.isfinite(test.predicted) else math.inf
+            for run in self.experiments
+            if (test := run.test) is not None
+            and not run.off_start
+            and run.quality is not None
+            and test.predicted is not None
+            and test.spread
+        )
+
+    @property
     def last_miss(self) -> float | None:
-        """Predicted minus flown quality of the last flight that has both, in predicted spreads."""
-        for run in reversed(self.experiments):
-            test = run.test
-            if (
-                test is None
-                or run.off_start
-                or run.quality is None
-                or test.predicted is None
-                or not test.spread
-            ):
-                continue
-            return (test.predicted - run.quality) / test.spread if math.isfinite(test.predicted) else math.inf
-        return None
+        """The same of the last one; None: there is none."""
+        return self.quality_misses[-1] if self.quality_misses else None
 
     @cached_property
     def _found_loops(self) -> _FoundLoops | str:

@@ -102,7 +102,7 @@ def diagnostics_of(
         explained = found.unanswered or bool(found.late) or any(remark.serious for remark in said)
         said += _does_not_follow(explained, found.without_test, found.disturbed, signals)
     else:
-        said += _free_run(found.misses, len(experiments), signals) if found.misses else ()
+        said += _free_run(found.misses, called(experiments), signals) if found.misses else ()
         said += _elsewhere(found.elsewhere)
     said += [*_model_error(found.recurring), *_copies(experiments), *_none_complete(experiments, steps)]
     return [*said, *_missed_predictions(experiments)]
@@ -266,14 +266,22 @@ def _of_range(share: float) -> str:
     )
 
 
-def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[Remark]:
-    """Which states the twin misses when it is flown by itself, on how many runs, and by how much."""
+def _on(places: Sequence[int], names: Sequence[str]) -> str:
+    """On which runs, the worst first."""
+    worst = names[places[0]]
+    return worst if len(places) == 1 else f"{len(places)} of them, most on {worst}"
+
+
+def _free_run(misses: Sequence[Miss], names: Sequence[str], signals: Signals) -> Iterator[Remark]:
+    """Which states the twin misses when it is flown by itself, on which runs, and by how much."""
+    runs = len(names)
     worst = sorted(misses, key=lambda miss: (not miss.diverges, -miss.times))
     if worst[0].diverges:
-        what = f"diverges on {max(miss.flights for miss in worst if miss.diverges)}"
+        lost = max((miss.flights for miss in worst if miss.diverges), key=len)
+        what = f"diverges on {_on(lost, names)}"
     else:
         named = [
-            f"{signals.state_names[miss.state]} on {miss.flights} ({_of_range(miss.share)},"
+            f"{signals.state_names[miss.state]} on {_on(miss.flights, names)} ({_of_range(miss.share)},"
             f" {two_digits(miss.times)} times what noise and disturbances explain)"
             for miss in worst[:NAMED]
         ]

@@ -43,14 +43,14 @@ class Miss:
 
     Args:
         state: its number.
-        flights: on how many it is missed so.
+        flights: places of those on which it is missed so, the one on which it is missed most first.
         share: of how far the state went, on the flight where this is most; infinite where the twin diverges.
         times: what noise and disturbances explain, on the flight where this is most; infinite where the twin diverges.
         undecided: whether it would be explained if all were disturbances that are not told from a model error.
     """
 
     state: int
-    flights: int
+    flights: tuple[int, ...]
     share: float
     times: float
     undecided: bool
@@ -108,13 +108,19 @@ def misses_of(
     return [
         Miss(
             int(state),
-            int((missed[:, state] > 0.0).sum()),
+            _most_first(missed[:, state], judged),
             float(shares[:, state].max()),
             float(missed[:, state].max()),
             not at_least[:, state].any(),
         )
         for state in np.flatnonzero((missed > 0.0).any(axis=0))
     ]
+
+
+def _most_first(missed: Floats, places: Sequence[int]) -> tuple[int, ...]:
+    """Places of the flights on which something is missed, by how much."""
+    order = np.argsort(-missed, kind="stable").tolist()
+    return tuple(places[i] for i in order if missed[i] > 0.0)
 
 
 def misses_any(
