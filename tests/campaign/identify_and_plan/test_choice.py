@@ -43,7 +43,7 @@ def under_flown_gains(members, genes):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
-    misses=False, fared=KEPT, in_gusts=None, delayed=None, blown_about=None, gains_count=True,
+    misses=False, rough=False, fared=KEPT, in_gusts=None, delayed=None, blown_about=None, gains_count=True,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -77,7 +77,7 @@ def chosen(
     blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
     late = [] if delayed is None else ["delayed"]
     committee = Committee([None], np.zeros(2), trusted, late, explained, blown, gains_count=gains_count)
-    choice = Choice(planner, committee, book, 4, confidence, misses)
+    choice = Choice(planner, committee, book, 4, confidence, misses, rough)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
         unfit=lambda book: list(unfit), on_task=lambda book, test: True,
@@ -106,6 +106,9 @@ def test_gains_of_a_twin_that_misses_its_flights_fly_before_they_are_recommended
     # While only the first controller has flown they are recommended, as those of a twin that explains its flights are.
     assert chosen(0.5, misses=True)[0] == "tuned"
     assert chosen(0.5, experiments=[came_true])[0] == "tuned"
+    # A linear law beside one that explains nothing may be wrong about any gains.
+    answer, reason = chosen(0.5, rough=True)
+    assert answer == "flown" and "the twin is rough, and gains that it prefers have to fly" in reason
 
 
 def test_gains_are_compared_in_the_disturbances_that_they_were_tuned_in():

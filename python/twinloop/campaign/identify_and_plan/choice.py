@@ -49,6 +49,7 @@ class Choice:
         confidence: share of members and draws that must find tuned gains better than the best flown, by half a percent
             or more, and by more than predictions have missed of late.
         misses: whether the twin misses its own flights.
+        rough: whether it is a law of linear terms, since none explains the flights.
     """
 
     planner: Planner
@@ -57,6 +58,7 @@ class Choice:
     draws: int
     confidence: float
     misses: bool = False
+    rough: bool = False
 
     def between(self, tuned: Floats, best: Test | None) -> Test:
         """The controller to fly, without excitation, for the campaign's own task.
@@ -160,8 +162,9 @@ class Choice:
                 "a flight with gains close to those that the twin prefers, or alike on it, failed or was cut"
             )
         others = flown is None or tuned.tobytes() != flown.genes.tobytes()
-        if others and flown is not None and self.misses and self._tuned_have_flown():
-            return "the twin misses its own flights, and gains that it prefers have to fly before they are recommended"
+        if others and flown is not None and (self.rough or (self.misses and self._tuned_have_flown())):
+            why = "is rough" if self.rough else "misses its own flights"
+            return f"the twin {why}, and gains that it prefers have to fly before they are recommended"
         if self.committee.lawless and (flown is None or not self.committee.gains_count):
             return f"the twin knows no law of {enumerated(self._lawless)} yet"
         if not self.committee.gains_count:

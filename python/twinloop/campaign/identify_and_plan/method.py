@@ -24,7 +24,7 @@ from twinloop.campaign.identify_and_plan.choice import Choice
 from twinloop.campaign.identify_and_plan.disproved import disproved
 from twinloop.campaign.identify_and_plan.inside import inside
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
-from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
+from twinloop.campaign.identify_and_plan.learning import Learner, is_rough, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
 from twinloop.campaign.identify_and_plan.starts import first_genes, known_gains, starts_of
 from twinloop.campaign.identify_and_plan.track_record import nearly_confirmed_in_a_row, unproven_risk
@@ -315,6 +315,7 @@ class IdentifyAndPlan:
             self.options.draws,
             self.options.confidence,
             self._latest().misses,
+            is_rough(self._latest().identified),
         )
         if at_once:
             tuned, note = known_gains(self.memory, best)
