@@ -20,8 +20,9 @@ from lives import SIGNALS, SMALL
 from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, read_signals, template
 from twinloop.campaign.examination import checking
+from twinloop.faces.about_test import foretold
 from twinloop.faces.cli import main
-from twinloop.faces.sheet import Sheet, foretold
+from twinloop.faces.sheet import Sheet
 from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
 from twinloop.planning.leaving import risk_words

@@ -16,7 +16,7 @@ from browser import SIZES, browser, kept, serious
 from conftest import PENDULUM_GAINS
 from dashboards import begun, flight, look, served
 from lives import SIGNALS, stored
-from twinloop.faces.sheet import excitation_words, hold_back_words, reason, unknown_risk
+from twinloop.faces.about_test import excitation_words, hold_back_words, reason, unknown_risk
 
 ENVELOPES = ((-2.0, 2.0), (-20.0, 20.0))
 BOUNDED = tl.Signals(

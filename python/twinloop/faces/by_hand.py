@@ -15,6 +15,7 @@ from twinloop.campaign.assessment import foreseen
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.persistence import stored_as
 from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.about_test import foretold
 from twinloop.faces.answering import answer, json_option, name_option, next_command, threads_option
 from twinloop.faces.cautions import advised_to_stop
 from twinloop.faces.columns import columns, columns_file, refuse_other
@@ -23,7 +24,7 @@ from twinloop.faces.first_test import first_test
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.opening import fields_beside, opened_by_hand
 from twinloop.faces.result import to_json
-from twinloop.faces.sheet import Sheet, foretold
+from twinloop.faces.sheet import Sheet
 from twinloop.faces.telling import (
     against_it,
     counted,

@@ -22,6 +22,13 @@ from twinloop._experiment.envelope import is_bounded
 from twinloop._ground.texts import in_unit, two_digits
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
+from twinloop.faces.about_test import (
+    excitation_words,
+    hold_back_ranges,
+    hold_back_words,
+    reason,
+    unknown_risk,
+)
 from twinloop.faces.cautions import advised_to_stop, not_reliable, serious_of
 from twinloop.faces.columns import columns, columns_file
 from twinloop.faces.dashboard.desk import Desk, to_be_learnt
@@ -30,14 +37,7 @@ from twinloop.faces.ends import ends, varying_words
 from twinloop.faces.opening import changed_since
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
-from twinloop.faces.sheet import (
-    Sheet,
-    excitation_words,
-    hold_back_ranges,
-    hold_back_words,
-    reason,
-    unknown_risk,
-)
+from twinloop.faces.sheet import Sheet
 from twinloop.faces.telling import is_chosen, numbered, to_be_flown
 from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
