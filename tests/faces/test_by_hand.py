@@ -524,6 +524,16 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     )
 
 
+def test_a_test_that_failed_once_and_was_flown_since_does_not_fail_any_more(folder):
+    run("ask", "rig.db")
+    assert run("tell", "rig.db", "0", "--failed", "motor cut out").exit_code == 0
+    flown(look().tests[0])
+    assert run("tell", "rig.db", "0", "flight.csv").exit_code == 0
+    refused = run("tell", "rig.db", "0", "--failed", "cable")
+    assert refused.exit_code == 2 and "without a recorded flight, found one that was flown" in refused.stderr
+    assert [failure.reason for failure in look().failures] == ["motor cut out"]
+
+
 def test_a_flight_may_be_told_as_aborted_without_a_reason(folder):
     run("ask", "rig.db")
     flown(look().tests[0])

@@ -117,7 +117,8 @@ seed = 0
 # [system.arguments]             # its arguments
 # noise = 0.001
 
-[options]                        # every option of the preset, at its default
+[options]                        # delay_least is chosen for a real machine; all others are at their default
+delay_least = 1.0                # periods of more delay that gains must bear: as many as a certificate asks for
 """
 
 
@@ -129,7 +130,9 @@ def template(store: str) -> str:
     """
     options = PRESETS["default"]
     lines = [
-        f"# {field.name} = {_toml(getattr(options, field.name))}" for field in dataclasses.fields(options)
+        f"# {field.name} = {_toml(getattr(options, field.name))}"
+        for field in dataclasses.fields(options)
+        if field.name != "delay_least"
     ]
     ask, run = to_type("ask", store), to_type("run", Path(store).with_suffix(".toml"))
     return TEMPLATE.format(ask=ask, run=run, names=", ".join(NAMED)) + "\n".join(lines) + "\n"

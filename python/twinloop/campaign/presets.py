@@ -208,6 +208,7 @@ _DEFAULT_RANGES: dict[str, tuple[float, float]] = {
     "reach_rest": (0, 1),
     "reach_growth": (0.1, 100),
     "reach_seen": (0, 1e6),
+    "delay_least": (0, 10),
     "evaluations": (64, _MANY),
     "tuning_starts": (1, 100),
     "tuning_members": (1, 1000),

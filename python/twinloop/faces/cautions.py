@@ -13,6 +13,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import controller_to_fly
 from twinloop.campaign.examination.checking import FRAGILE, PERIODS
 from twinloop.campaign.history import Lesson
+from twinloop.campaign.presets import DefaultOptions
 from twinloop.errors import NotAvailable
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -108,6 +109,8 @@ def thin_margins(campaign: Campaign, test: Test) -> list[str]:
             found.append(f"{more} more delay, less than a period, makes the loop of {latest.loop} unstable")
     said = " and ".join(found)
     cut = "Cut the flight if it begins to oscillate; a certificate of these gains would be refused."
+    if isinstance(campaign.options, DefaultOptions) and campaign.options.delay_least < PERIODS:
+        cut += " For others begin again from these flights with the option delay_least = 1.0."
     return [f"On the twin {said}. {cut}"] if found else []
 
 

@@ -167,8 +167,10 @@ def tell_failed(
         StoreFailure: the store cannot be written.
     """
     test = numbered(campaign, number)
-    status = campaign.status(test)
-    if status in ("flown", "aborted"):
+    failures = {each.reason for each in campaign.failures if each.recorded and each.test.number == number}
+    flights = [run for run in campaign.experiments if run.number == number]
+    if any(run.trajectory.reason not in failures for run in flights):
+        status = "flown" if any(run.complete for run in flights) else "aborted"
         withdraw = next_command(campaign, "withdraw", number, "--reason", "WHY")
         raise InvalidInput(
             f"Test {number}: expected one without a recorded flight, found one that was {status}; if that was recorded"

@@ -324,8 +324,8 @@ def _next_of_failed(found: Examination, failed: list[Check], off: str) -> Senten
         text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"
         return _next(answers.OTHER_TASK, text, *links)
     text = (
-        f"{knows} What fails is the controller: {failed[0].name}. Begin again from these flights with narrower bounds"
-        f" of its gains, or with effort in the quality.{off}"
+        f"{knows} What fails is the controller: {failed[0].name}. Begin again from these flights with {answers.CALMER}."
+        f"{off}"
     )
     return _next(answers.CALMER_CONTROLLER, text, *links)
 

@@ -565,6 +565,23 @@ def test_the_delay_that_gains_bear_and_the_one_they_fly_well_with_shrink_with_ea
             assert later(committee.tuned_delayed) == (0, pytest.approx(counted))
 
 
+@pytest.mark.parametrize(
+    ("least", "true", "borne"), [(1.0, 3, (1, 0.0)), (1.5, 0, (1, 0.5)), (0.3, 1, (0, 0.5))]
+)
+def test_a_delay_that_is_asked_for_is_borne_whatever_came_true(begin, pendulum, least, true, borne):
+    campaign = told(begin(options={"delay_least": least}), pendulum)
+    _ = campaign.twin
+    method, book = campaign._method, campaign._book
+    with mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=true):
+        committee = method._committee(book)
+    models = method._latest().believed[0], committee.delayed[0]
+    (before,), (after,) = (Actuation.of(model, SIGNALS).actuators for model in models)
+    later = after.delay - before.delay, (after.lag - before.lag) / SIGNALS.dt
+    assert later == (borne[0], pytest.approx(borne[1]))
+    # Where a whole one is asked for they are tuned with it as well, on the same model.
+    assert (committee.tuned_delayed is committee.delayed) == (least >= 1.0)
+
+
 def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(
     begin, pendulum
 ):

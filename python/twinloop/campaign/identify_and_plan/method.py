@@ -377,12 +377,16 @@ class IdentifyAndPlan:
         # that nobody knew of would make flights worse than predicted.
         true = nearly_confirmed_in_a_row(book.experiments, or_better=True)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
-        wanted = self.options.delay_margin and not stands_in(latest.identified)
+        wanted, least = (
+            self.options.delay_margin and not stands_in(latest.identified),
+            self.options.delay_least,
+        )
+        tolerated, tuned_with = (max(share**true, least) for share in (TOLERATED, TUNED_WITH))
 
-        def slower(share: float) -> list[_core.Model]:
-            return [delayed(latest.believed[0], self.setup.signals, share**true)] if wanted else []
+        def slower(periods: float) -> list[_core.Model]:
+            return [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []
 
-        borne = slower(TOLERATED)
+        borne = slower(tolerated)
         flights = without_wrong_readings(latest.flights(book.experiments), self.setup.signals)
         lawless = lawless_states(latest.identified, flights, self.setup)
         best = standing.best_flown(book)
@@ -395,7 +399,7 @@ class IdentifyAndPlan:
             delayed=borne,
             explains=latest.explained,
             gusts=self._gusts(latest, len(book.experiments)),
-            tuned_delayed=slower(TUNED_WITH) if true else borne,
+            tuned_delayed=borne if tuned_with == tolerated else slower(tuned_with),
             foretells=latest.explained and nearly_confirmed_in_a_row(book.experiments) > 0,
             ending=self._ending(latest, book),
             gains_count=gains_count(self.planner, latest.believed[:1], untunable),

@@ -97,8 +97,7 @@ WORDS = {
     ),
     answers.OTHER_TASK: "change the task or the controller, whose loops could not be checked.",
     answers.CALMER_CONTROLLER: (
-        "ask for a calmer controller, with narrower bounds of its gains or with effort in the quality: another flight"
-        " would hardly change this one."
+        f"ask for a calmer controller, with {answers.CALMER}: another flight would hardly change this one."
     ),
     answers.ASK: "ask for a flight to see what it would bring.",
 }
