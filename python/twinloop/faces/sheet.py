@@ -147,7 +147,6 @@ class Sheet:
             *([self.advice] if self.advice else []),
             "",
             _table(["set this gain", "to", "unit"], gains),
-            *_at_bounds(test),
             "",
             *_ends(test, file),
             "",
@@ -158,6 +157,7 @@ class Sheet:
             *self._foreseen(),
             *band_leaves(signals, self.predicted),
             *self.margins,
+            *_at_bounds(test),
             *not_reliable(self.stored_as, self.against),
             reason(test, self.predicted is not None, self.chosen),
             *_alike(test, self.waiting),
@@ -232,11 +232,11 @@ def _at_bounds(test: Test) -> list[str]:
     """Gains at a bound of theirs, where the box decides and not the quality; those at 0 are not missed."""
     at = test.family.at_bounds(test.genes)
     ends = [
-        f"{gain.name} is at its {at[gain.name]} bound, {end:.4g}"
+        f"{gain.name} is at its {at[gain.name]} one, {end:.4g}"
         for gain in test.family.gains
         if at[gain.name] and (end := gain.low if at[gain.name] == "lower" else gain.high) != 0.0
     ]
-    return [f"{enumerated(ends)}: better gains may lie beyond."] if ends else []
+    return [f"Better gains may lie beyond their bounds: {enumerated(ends)}."] if ends else []
 
 
 def _begin_within(test: Test) -> str:

@@ -119,4 +119,4 @@ def test_a_law_is_invalid_where_a_model_error_may_be_what_explains_it_and_it_is_
     answer = SimpleNamespace(
         explained=explained, believed=[law(damping)], misses=lambda flights, setup, workers: missed
     )
-    assert learner._judged(answer, SimpleNamespace(flights=[None, None])).invalid is invalid
+    assert learner._invalid(answer, SimpleNamespace(flights=[None, None])) is invalid

@@ -139,9 +139,26 @@ class Learner:
         experiments = len(book.experiments)
         needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
         earlier = None if asked is None else asked.identified
-        found, begun = self._of_all(book.experiments, earlier, under_way, keep)
+        data, begun = self._data_of(book.experiments), under_way
+
+        def kept(so_far: UnderWay) -> None:
+            nonlocal begun
+            begun = so_far
+            keep(so_far)
+
+        answer = data.answered(
+            data.identify(
+                self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=kept
+            )
+        )
+        if not answer.explained and self.options.earlier_twin and earlier is not None:
+            answer = or_known_before(answer, earlier, data.answered)
+        found = Judged(answer, data, self._invalid(answer, data))
+        within = self._inside(book.experiments, earlier) if found.invalid and self.options.inside else None
+        if within is not None:
+            found, begun = within
         if earlier is not None:
-            found = self._or_tuned_again(found, earlier, begun)
+            found = self._tuned_again(found, earlier, begun) or found
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if self.options.plain != self.options and found.invalid:
             found, two = self._of_two(found, two, experiments)
@@ -149,15 +166,14 @@ class Learner:
             answered = found.data.answered
             foretold = or_foretold(found.answer, asked.identified, asked.experiments, answered)
             if foretold is not found.answer:
-                found = self._judged(foretold, found.data)
-        answer, data = found.answer, found.data
-        identified = answer.identified
+                found = replace(found, answer=foretold, invalid=self._invalid(foretold, found.data))
+        answer, identified = found.answer, found.answer.identified
         lesson = lesson_of(
             answer,
             is_rough(identified),
             book,
-            data.flights,
-            data.selected,
+            found.data.flights,
+            found.data.selected,
             None if earlier is None else earlier.model,
             self._contradicting(found),
             self.workers,
@@ -181,39 +197,15 @@ class Learner:
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
         )
 
-    def _of_all(
-        self,
-        experiments: Sequence[Experiment],
-        earlier: Identified | None,
-        under_way: UnderWay | None,
-        keep: Callable[[UnderWay], None],
-    ) -> tuple[Judged, UnderWay | None]:
-        """What all flights teach, or as far as they were inside their envelope; and how far its search has come."""
-        data, begun = self._data_of(experiments), under_way
-
-        def kept(so_far: UnderWay) -> None:
-            nonlocal begun
-            begun = so_far
-            keep(so_far)
-
-        identified = data.identify(
-            self.options, iteration=len(experiments), earlier=earlier, under_way=under_way, keep=kept
-        )
-        answer = data.answered(identified)
-        if not answer.explained and self.options.earlier_twin and earlier is not None:
-            answer = or_known_before(answer, earlier, data.answered)
-        found = self._judged(answer, data)
-        within = self._inside(experiments, earlier) if found.invalid and self.options.inside else None
-        return (found, begun) if within is None else within
-
-    def _or_tuned_again(self, found: Judged, earlier: Identified, begun: UnderWay | None) -> Judged:
-        """An answer, or the law known before, tuned on all flights: where that explains them, or is tamer."""
-        data = found.data
+    def _tuned_again(self, found: Judged, earlier: Identified, begun: UnderWay | None) -> Judged | None:
+        """The law known before, tuned on all flights: where that explains them, or is tamer; None elsewhere."""
+        data, better = found.data, None
         again = cache(partial(self._known_again, data, earlier, begun))
         if not found.answer.explained and self.options.earlier_twin:
-            found = self._judged(or_known_again(found.answer, again()), data)
+            answer = or_known_again(found.answer, again())
+            found = better = Judged(answer, data, self._invalid(answer, data))
         tamer = self._tamer(found, earlier, again) if self.options.tame else None
-        return found if tamer is None else self._judged(tamer, data)
+        return better if tamer is None else Judged(tamer, data, self._invalid(tamer, data))
 
     def _contradicting(self, found: Judged) -> Odd | None:
         """The log that contradicts all others, where the law that explains them was made for it."""
@@ -254,20 +246,20 @@ class Learner:
         answer = data.answered(found, number=5)
         if not (answer.explained or enough_inside(experiments, kept)):
             return None
-        return self._judged(answer, data), begun[-1] if begun else None
+        judged = Judged(answer, data, self._invalid(answer, data))
+        return judged, begun[-1] if begun else None
 
-    def _judged(self, answer: Answer, data: EstimationData) -> Judged:
-        """An answer, invalid where it does not explain the flights, or what may be a model error does and it is wild.
+    def _invalid(self, answer: Answer, data: EstimationData) -> bool:
+        """Whether a law does not explain the flights; or only what may be a model error explains them, and it is wild.
 
         Whatever may disturb explains much. A law that needs it, and diverges under most controllers of the box, such as
         one with a hidden state that stands in for a load behind a gap, is no better than a linear one for that.
         """
         if not answer.explained:
-            return Judged(answer, data, True)
+            return True
         everywhere = self._drawn(data.flights, 0)
         (lasting,) = lasting_under(answer.believed[:1], self.setup, everywhere, self.workers)
-        wild = 2 * lasting < DRAWN and bool(answer.misses(data.flights, self.setup, self.workers))
-        return Judged(answer, data, wild)
+        return 2 * lasting < DRAWN and bool(answer.misses(data.flights, self.setup, self.workers))
 
     def _known_again(self, data: EstimationData, known: Identified, begun: UnderWay | None) -> Answer:
         """The law known before, tuned on all flights: wrong and late readings, and the form, are of the search anew."""
