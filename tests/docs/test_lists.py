@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import twinloop
 from twinloop.campaign.campaign_file import SECTIONS
 from twinloop.faces.dashboard.desk import LOST, in_words
 from twinloop.store import Doing
@@ -47,6 +48,27 @@ def test_every_table_of_a_store_is_listed_with_its_columns():
         for table in metadata.sorted_tables
     }
     assert listed == kept
+
+
+def test_every_code_of_a_remark_is_explained():
+    package = Path(twinloop.__file__).parent
+    source = "\n".join(path.read_text("utf-8") for path in package.rglob("*.py"))
+    # What makes a remark is `note`, `serious`, one of both, or what was chosen of both before.
+    made = r"(?:\b(?:note|serious|say)|else note\))\(\s*(?:\"([a-z-]+)\"|([A-Z_]+),)"
+    codes = {
+        code or re.search(rf'^{name} = "([a-z-]+)"', source, re.MULTILINE)[1]
+        for code, name in re.findall(made, source)
+    }
+    tables = (DOCS / "remarks.md").read_text("utf-8") + section(
+        "command-line.md", "`twinloop check LOG FILE.toml`"
+    )
+    listed = {
+        code
+        for row in re.findall(r"^\| (`[^|]*) \|", tables, re.MULTILINE)
+        for code in re.findall(r"`([\w-]+)`", row)
+    }
+    assert len(codes) > 50 and codes <= listed
+    assert not listed - codes - {"commands-late", "commands-early"}
 
 
 def test_the_page_on_the_dashboard_quotes_what_is_said_of_a_writer_that_was_killed():
