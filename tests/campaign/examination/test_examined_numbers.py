@@ -161,6 +161,11 @@ def test_poles_are_the_same_whatever_the_unit_of_time(unit):
         )
 
 
+def test_what_is_over_within_a_period_has_no_rate():
+    (slow,) = poles(np.array([0.5, 4e-8 + 1e-8j, 4e-8 - 1e-8j, -1e-6]), 0.02)
+    assert slow.time == pytest.approx(0.02 / math.log(2.0))
+
+
 # Steps, use, data
 
 

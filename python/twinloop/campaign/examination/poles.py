@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FAR = 1e-9
-"""Poles of discrete time nearer to 0 than this are memories that are gone after a period: they have no rate."""
+FAR = 1e-3
+"""Poles of discrete time nearer to 0 than this are memories of which a thousandth is left after a period, at most: what
+is over within one has no rate that anybody could see."""
 ROUNDING = 1e-9
 """Of the fastest pole, or of 1 / dt: what is smaller is rounding, in whatever unit time is."""
 
