@@ -118,7 +118,7 @@ seed = 0
 # noise = 0.001
 
 [options]                        # delay_least is chosen for a real machine; all others are at their default
-delay_least = 1.0                # periods of more delay that gains must bear: as many as a certificate asks for
+delay_least = 1.0                # periods of more delay that gains must bear, as a certificate asks; not of "paper"
 """
 
 

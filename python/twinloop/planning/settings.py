@@ -54,8 +54,8 @@ class PlanningOptions:
         delay_margin: whether gains are tuned with, and must tolerate, one more period of delay; for each of the last
             predictions of new gains in a row that came true, or that the flight was better than, the delay that gains
             must tolerate is halved, and the one that they are tuned with is quartered.
-        delay_least: periods of more delay that they are tuned with, and must tolerate, whatever came true: with 1 a
-            certificate hardly ever refuses them for their margins, and they cost some quality.
+        delay_least: periods of more delay that they are tuned with, and must tolerate, whatever came true, beside
+            `delay_margin`: with 1 they have the margins that a certificate asks for, and cost some quality.
         confidence: share of members and draws that must find new gains better than the best flown ones, by half a
             percent or more, and by more than predictions have missed of late.
         track_record: whether new gains must also be better by the error of earlier predictions.
