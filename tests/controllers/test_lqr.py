@@ -164,9 +164,10 @@ def test_gains_that_do_not_exist_are_said_not_to(pendulum_signals, case):
         lqr_gains(step, family, [0.0, 0.0])
 
 
-def test_an_output_that_is_clipped_at_rest_is_refused(pendulum_signals):
-    with pytest.raises(tl.InvalidInput, match=r"torque within its bounds, .* found 5"):
-        StateFeedback(None, WIDE, Mixer([[1.0]], [5.0])).bind(pendulum_signals)
+def test_an_output_that_is_clipped_at_rest_leads_nowhere(pendulum_signals):
+    family = StateFeedback(None, WIDE, Mixer([[1.0]], [5.0])).bind(pendulum_signals)
+    with pytest.raises(tl.NotAvailable, match="no feedback stabilises"):
+        lqr_gains(lambda x, u: (x[0] + 0.05 * x[1], x[1] + u[0]), family, [0.0, 0.0])
 
 
 def test_a_root_of_nothing_has_no_slope(pendulum_signals):

@@ -1,5 +1,7 @@
 """State feedback: the law against plain NumPy, the names, units and bounds of its gains, its contract."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -130,11 +132,21 @@ UNFIT = {
     "an unknown gain": (StateFeedback(None, {"angel": (0, 1), "rate": (0, 1)}), "Unknown gain 'angel'"),
     "a missing gain": (StateFeedback(None, {"angle": (0, 1)}), "found none for rate->torque"),
     "a mixer for two commands": (StateFeedback(None, (0, 1), Mixer([[1.0], [1.0]])), "expected the shape"),
-    "an offset in percent": (
-        StateFeedback(None, (0, 1), Mixer([[1.0]], [62.0])),
-        "within its bounds, .* found 62; give it in the unit of the command",
-    ),
 }
+
+
+def test_no_campaign_begins_with_an_offset_that_no_command_can_reach(new_campaign, pendulum_signals):
+    in_percent = StateFeedback(None, (0, 1), Mixer([[1.0]], [62.0]))
+    with pytest.raises(
+        tl.InvalidInput, match=r"within its bounds, .* found 62; give it in the unit of the command"
+    ):
+        new_campaign(controller=in_percent)
+    # One that was begun is read all the same, and what has no offset may be clipped at rest.
+    record = new_campaign(controller=StateFeedback(None, (0, 1), Mixer([[1.0]], [0.5]))).to_record()
+    record["setup"]["controller"]["output"]["offset"] = [62.0]
+    assert tl.Campaign.from_record(record).setup.mixer.offset == [62.0]
+    pushes = replace(pendulum_signals, commands=[tl.Command("torque", "N m", (0.2, 1.0))])
+    Mixer([[1.0]]).check_offset(pushes)
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -22,7 +22,7 @@ FRONTS = {
     "autopilots": "declared files sweep",
     "campaign": (
         "agreement assessment campaign_file certificate cost from_logs history keeping persistence presets "
-        "provenance remaining setup"
+        "provenance remaining setup withdrawing"
     ),
     "campaign/coevolution": "method search",
     "campaign/data": (
@@ -32,7 +32,7 @@ FRONTS = {
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "reaching rivals steps unseen use"
     ),
-    "campaign/identify_and_plan": "method",
+    "campaign/identify_and_plan": "method track_record",
     "controllers": "custom family gains riccati state_feedback",
     "faces": "answering cli console files notebook plots result run_info terminal",
     "faces/dashboard": "command",

@@ -120,7 +120,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
         refuse_arguments("Campaign", other, list(signature(Campaign).parameters)[:-1])
         flights = Flights(signals, controller, initial_state, target_state, duration)
         choices = Choices(preset, options, seed, goal, quality, operators, weights)
-        self._begin(checked(flights, choices), threads, progress)
+        setup = checked(flights, choices)
+        if setup.mixer is not None:
+            # Of what is begun: a campaign that has such an offset must be read all the same.
+            setup.mixer.check_offset(setup.signals)
+        self._begin(setup, threads, progress)
         if store is not None:
             self._open(store, name)
 

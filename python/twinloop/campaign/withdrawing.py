@@ -174,7 +174,7 @@ def _of_failure(book: Logbook, failure: Failure) -> Place:
         )
     if not failure.recorded:
         return None, places[0]
-    parts = [place for place in runs if _is_record_of(book.recorded[place], failure)]
+    parts = [place for place in runs if is_record_of(book.recorded[place], failure)]
     return (parts[-1] if parts else None), places[0]
 
 
@@ -196,14 +196,16 @@ def _of_experiment(book: Logbook, run: Experiment) -> Place:
 
 def _failure_of(book: Logbook, run: Experiment) -> int | None:
     """The failure whose record a run is; None: it is that of none."""
-    of = [
-        place
-        for place in _counting(book)[1]
-        if book.reported[place].recorded and _is_record_of(run, book.reported[place])
-    ]
+    of = [place for place in _counting(book)[1] if is_record_of(run, book.reported[place])]
     return of[-1] if of else None
 
 
-def _is_record_of(run: Experiment, failure: Failure) -> bool:
-    """Whether a run is what was recorded until a test failed."""
-    return run.number == failure.test.number and run.trajectory.reason == failure.reason
+def is_record_of(run: Experiment, failure: Failure) -> bool:
+    """Whether a run is what was recorded until a test failed.
+
+    Args:
+        run: of a campaign.
+        failure: of the same.
+    """
+    same = run.number == failure.test.number and run.trajectory.reason == failure.reason
+    return failure.recorded and same

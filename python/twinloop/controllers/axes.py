@@ -72,7 +72,7 @@ def asked_units(family: str, output: Mixer | None, axes: int, signals: Signals) 
         InvalidInput: another number of axes than of commands, or a map of another shape.
     """
     if output is not None:
-        output.check(signals, axes)
+        output.check(signals.n_u, axes)
         return [output.unit] * axes
     if axes != signals.n_u:
         raise InvalidInput(

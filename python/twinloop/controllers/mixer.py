@@ -55,27 +55,37 @@ class Mixer(Recorded, kind="mixer"):
         assert self.offset is not None  # __post_init__ has set it
         return self.matrix, self.offset, self.power
 
-    def check(self, signals: Signals, axes: int) -> None:
-        """Checks that it fits commands, and a number of axes.
+    def check(self, commands: int, axes: int) -> None:
+        """Checks that the matrix fits these numbers of axes and commands.
 
         Args:
-            signals: with the commands.
+            commands: n_u.
             axes: outputs of the controller's law.
 
         Raises:
-            InvalidInput: a matrix of another shape, or an offset that no command can reach.
+            InvalidInput: a matrix of another shape.
         """
-        if self.matrix.shape != (signals.n_u, axes):
+        if self.matrix.shape != (commands, axes):
             raise InvalidInput(
-                f"Mixer, matrix: expected the shape ({signals.n_u}, {axes}) (commands, axes), found"
+                f"Mixer, matrix: expected the shape ({commands}, {axes}) (commands, axes), found"
                 f" {self.matrix.shape}; one row a command, one column an axis."
             )
+
+    def check_offset(self, signals: Signals) -> None:
+        """Refuses an offset that no command can reach; 0 is none, and may be beyond the bounds.
+
+        Args:
+            signals: with as many commands.
+
+        Raises:
+            InvalidInput: such an offset.
+        """
         assert self.offset is not None  # __post_init__ has set it
         at_rest = np.sign(self.offset) * np.abs(self.offset) ** self.power
         for command, value in zip(signals.commands, at_rest.tolist(), strict=True):
             low, high = command.bounds
             beyond = ROUNDED * max(abs(low), abs(high))
-            if not low - beyond <= value <= high + beyond:
+            if value != 0.0 and not low - beyond <= value <= high + beyond:
                 raise InvalidInput(
                     f"Mixer, offset: expected {command.name} within its bounds, {low:g} to {high:g}, where no axis asks"
                     f" for anything, found {value:g}; give it in the unit of the command."

@@ -81,7 +81,7 @@ class StateFeedback(Recorded, kind="state_feedback"):
             outputs = {command.name: command.unit for command in signals.commands}
         else:
             axes = self.output.matrix.shape[1]
-            self.output.check(signals, axes)
+            self.output.check(signals.n_u, axes)
             outputs = {f"u{j + 1}": self.output.unit for j in range(axes)}
         gains = self._gains(signals, states, outputs)
         engine = _core.Family.state_feedback(

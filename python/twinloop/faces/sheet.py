@@ -30,7 +30,6 @@ from twinloop.faces.telling import is_chosen, to_be_flown
 from twinloop.faces.text import counted, quality_words, table
 from twinloop.logs import TIME
 from twinloop.planning.leaving import risk_of_what, risk_words
-from twinloop.planning.quality import quality_unit
 from twinloop.remarks import Remark
 from twinloop.store import StoredAs
 from twinloop.test import Test
@@ -171,9 +170,9 @@ class Sheet:
         """The quality and the run that are predicted, and the risk."""
         test, predicted, bounded = self.test, self.predicted, is_bounded(self.test.family.signals)
         if test.predicted is not None and predicted is not None:
-            quality = self.setup.quality
-            measure = quality_words(quality.kind, quality_unit(quality))
-            yield f"Predicted quality, {measure}: {foretold(test)}; what counts: {counted(quality_facts(quality))}."
+            measure = quality_facts(self.setup.quality)
+            what = quality_words(measure["kind"], measure["unit"])
+            yield f"Predicted quality, {what}: {foretold(test)}; what counts: {counted(measure)}."
             yield f"The predicted run with its band: {self.file}."
         if test.excitation is not None or predicted is not None:
             yield from ("", _expected(test, predicted), "")

@@ -12,6 +12,7 @@ from twinloop.campaign.data.copies import copied, copy_of, saved_again
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.history import called as names_of
+from twinloop.campaign.withdrawing import is_record_of
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import next_command
 from twinloop.logs import Log, read_log
@@ -167,9 +168,12 @@ def tell_failed(
         StoreFailure: the store cannot be written.
     """
     test = numbered(campaign, number)
-    failures = {each.reason for each in campaign.failures if each.recorded and each.test.number == number}
-    flights = [run for run in campaign.experiments if run.number == number]
-    if any(run.trajectory.reason not in failures for run in flights):
+    flights = [
+        run
+        for run in campaign.experiments
+        if run.number == number and not any(is_record_of(run, each) for each in campaign.failures)
+    ]
+    if flights:
         status = "flown" if any(run.complete for run in flights) else "aborted"
         withdraw = next_command(campaign, "withdraw", number, "--reason", "WHY")
         raise InvalidInput(

@@ -13,13 +13,12 @@ from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.checking import COLOURED
 from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.identify_and_plan.track_record import SURE
 from twinloop.faces import answers
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
 from twinloop.faces.text.words import every, flown_words, quality_words
 
-NEAR = 2.0
-"""Spreads of a predicted quality within which it came true."""
 ALL_CHECKS = ("checks", "all checks")
 """Where all checks stand, and what to call it."""
 EVIDENCE = {
@@ -198,11 +197,11 @@ def _foretold(found: Examination) -> str:
     misses = found.quality_misses
     if not misses:
         return ""
-    near = sum(abs(miss) <= NEAR for miss in misses)
+    near = sum(abs(miss) <= SURE for miss in misses)
     if len(misses) == 1:
         came = "came" if near else "did not come"
-        return f" The only quality that it predicted {came} within {NEAR:g} of its spreads."
-    return f" Of the {len(misses)} qualities that it predicted, {near} came within {NEAR:g} of their spreads."
+        return f" The only quality that it predicted {came} within {SURE:g} of its spreads."
+    return f" Of the {len(misses)} qualities that it predicted, {near} came within {SURE:g} of their spreads."
 
 
 def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
@@ -316,10 +315,8 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
 
 def _next_of_failed(found: Examination, failed: list[Check], off: str) -> Sentence:
     """What to do where the twin knows enough and its controller is not to be flown."""
-    knows, links = (
-        "The twin knows enough: another flight would hardly improve the quality.",
-        _links(found, failed),
-    )
+    knows = "The twin knows enough: another flight would hardly improve the quality."
+    links = _links(found, failed)
     if found.margins is None:
         text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"
         return _next(answers.OTHER_TASK, text, *links)

@@ -132,7 +132,7 @@ class Guard:
         self.reason = ""
         self.tripped_at: int | None = None
         self._leaving = 0
-        self._last: Floats | None = None
+        self._read: Floats | None = None
         self._time: float | None = None
         self._broken = np.zeros(self.signals.n_x, bool)
         self._estimate: Floats | None = None
@@ -174,7 +174,7 @@ class Guard:
             )
         if not self.tripped:
             # Whatever it trips on, the record ends with what was read then.
-            self._last = None if self._sensors.missing(reading).any() else reading.copy()
+            self._read = reading.copy()
         goal = self._goal(target)
         own = None
         if not self.tripped:
@@ -269,6 +269,11 @@ class Guard:
         )
 
     # Inside
+
+    @property
+    def _last(self) -> Floats | None:
+        """What was read last before it tripped; None where that is no reading."""
+        return None if self._read is None or self._sensors.missing(self._read).any() else self._read
 
     def _watch(self, reading: Floats) -> None:
         """Trips on the first thing that is wrong."""

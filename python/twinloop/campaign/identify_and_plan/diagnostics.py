@@ -266,10 +266,10 @@ def _of_range(share: float) -> str:
     )
 
 
-def _on(places: Sequence[int], names: Sequence[str]) -> str:
+def _on(places: Sequence[int], names: Sequence[str], most: str = "most on") -> str:
     """On which runs, the worst first."""
     worst = names[places[0]]
-    return worst if len(places) == 1 else f"{len(places)} of them, most on {worst}"
+    return worst if len(places) == 1 else f"{len(places)} of them, {most} {worst}"
 
 
 def _free_run(misses: Sequence[Miss], names: Sequence[str], signals: Signals) -> Iterator[Remark]:
@@ -278,7 +278,7 @@ def _free_run(misses: Sequence[Miss], names: Sequence[str], signals: Signals) ->
     worst = sorted(misses, key=lambda miss: (not miss.diverges, -miss.times))
     if worst[0].diverges:
         lost = max((miss.flights for miss in worst if miss.diverges), key=len)
-        what = f"diverges on {_on(lost, names)}"
+        what = f"diverges on {_on(lost, names, 'such as')}"
     else:
         named = [
             f"{signals.state_names[miss.state]} on {_on(miss.flights, names)} ({_of_range(miss.share)},"

@@ -377,11 +377,10 @@ class IdentifyAndPlan:
         # that nobody knew of would make flights worse than predicted.
         true = nearly_confirmed_in_a_row(book.experiments, or_better=True)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
-        wanted, least = (
-            self.options.delay_margin and not stands_in(latest.identified),
-            self.options.delay_least,
+        wanted = self.options.delay_margin and not stands_in(latest.identified)
+        tolerated, tuned_with = (
+            max(share**true, self.options.delay_least) for share in (TOLERATED, TUNED_WITH)
         )
-        tolerated, tuned_with = (max(share**true, least) for share in (TOLERATED, TUNED_WITH))
 
         def slower(periods: float) -> list[_core.Model]:
             return [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []
