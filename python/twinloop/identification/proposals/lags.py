@@ -37,11 +37,12 @@ MOST_DELAY = 50
 RAMPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0)
 """Periods in which an actuator crosses all commands that were sent: limits of its rate that are tried."""
 CLEARLY = 24.0
-"""Units of χ² by which a limit of the rate must be worse than none for slower ones not to be tried."""
+"""Units of χ² by which lags, or limits of the rate, must be worse than none for longer and slower ones not to be tried."""
 GRID, RATES = 0, 1000
 """Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
-Trial = Callable[[Iterable[Actuation]], list[Hypothesis]]
-"""The hypothesis behind each of several other actuators, with sums of the first rung."""
+Trial = Callable[[Hypothesis | None, Iterable[Actuation]], list[Hypothesis]]
+"""The hypothesis behind each of several other actuators, with sums of the first rung that are no worse there than those of
+one that was tried before, if any: what walks find by chance on a large machine outweighs a lag."""
 
 
 def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -51,7 +52,7 @@ def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("actuators")
     number = itertools.count()
     trial = _trials(context, hypothesis, number)
-    (best,) = trial([Actuation.direct(context.signals)])
+    (best,) = trial(None, [Actuation.direct(context.signals)])
     for group in hypothesis.alike:
         best = _searched(context, trial, best, group)
     best = _without(trial, best)
@@ -78,7 +79,7 @@ def _searched(context: Context, trial: Trial, best: Hypothesis, group: Sequence[
     """The best so far, or a better one with another lag or delay of a group."""
     for delay in range(context.options.longest_delay + 1):
         best = _best_lag(context, trial, best, group, delay)
-    return _longer(context, trial, best, group)
+    return _rested(context, trial, _longer(context, trial, best, group), group)
 
 
 def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothesis:
@@ -92,7 +93,7 @@ def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothes
             continue
         split = replace(best, alike=one_by_one(best.alike, group))
         trial = _trials(context, split, number)
-        (own,) = trial([best.actuation])
+        (own,) = trial(best, [best.actuation])
         for i in group:
             own = _searched(context, trial, own, (i,))
         best = max([best, own], key=by_evidence)
@@ -115,7 +116,7 @@ def _at_limited_rates(context: Context, best: Hypothesis) -> Hypothesis:
             if other.evidence > best.evidence:
                 best, found = other, periods
             # Past the true rate the fit only gets worse, and without a limit from the first one on.
-            worse = worse + 1 if best.evidence > other.evidence.less(-CLEARLY) else 0
+            worse = worse + 1 if _clearly_worse(other, best) else 0
             if worse == 2:
                 break
         for periods in (found / FINER, found * FINER) if found is not None else ():
@@ -136,24 +137,24 @@ def _ramped(
             ramp = periods * context.signals.dt * context.signals.commands[i].size
             actuators[i] = actuators[i]._replace(lag=lag, ramp=ramp)
         several.append(replace(best.actuation, actuators=tuple(actuators)))
-    return max(trial(several), key=by_evidence)
+    return max(trial(best, several), key=by_evidence)
 
 
 def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int], of: int = GRID) -> Trial:
     """What tries actuators for a hypothesis; the searches of each trial are a part of one unit of work."""
     unit = context.unit.part(hypothesis.start, of)
-    driven = [found.chain for found in hypothesis.sums]
 
-    def behind_one(asked: tuple[Actuation, Unit]) -> Hypothesis:
-        actuation, own = asked
+    def behind_one(asked: tuple[Hypothesis | None, Actuation, Unit]) -> Hypothesis:
+        before, actuation, own = asked
         behind = replace(hypothesis, actuation=actuation)
+        driven = [found.chain for found in (before or hypothesis).sums]
+        known = before.sums if before else [None] * len(driven)
         walks = context.walks(own, context.options.moves // 4)
-        terms, nothing = behind.candidates.ladder[0], [None] * len(driven)
-        sums = search(Problem(context, behind), driven, terms, nothing, walks)
+        sums = search(Problem(context, behind), driven, behind.candidates.ladder[0], known, walks)
         return replace(behind, sums=tuple(sums))
 
-    def trial(several: Iterable[Actuation]) -> list[Hypothesis]:
-        asked = [(actuation, unit.part(next(number))) for actuation in several]
+    def trial(before: Hypothesis | None, several: Iterable[Actuation]) -> list[Hypothesis]:
+        asked = [(before, actuation, unit.part(next(number))) for actuation in several]
         return side_by_side(behind_one, asked, context.workers.threads)
 
     return trial
@@ -164,25 +165,38 @@ def _best_lag(
 ) -> Hypothesis:
     """The best so far, or a better one with this delay.
 
-    From no lag on a short one may describe runs worse, and a longer one better. A delay has to be better soon: behind
-    one or two periods more even runs of a machine without any find some lag that suits their noise.
+    From no lag on a short one may describe runs worse, and a longer one better, but not where it is clearly worse. A delay
+    has to be better soon: behind one or two periods more even runs of a machine without any find some lag that suits
+    their noise.
     """
-    (found,) = [best] if delay else trial([best.actuation.at_once(group)])
-    lag, worse = None if delay else 0.0, 0
+    (found,) = [best] if delay else trial(best, [best.actuation.at_once(group)])
+    lag, worse, rests = None if delay else 0.0, 0, _rests(context, best, group)
     for tried in LAGS if delay else LAGS[1:]:
-        other = _at(context, trial, best, group, delay, [tried])
+        several = _at(context, trial, found, group, delay, [tried], rests)
+        other = max(several, key=by_evidence)
         if other.evidence > found.evidence:
             found, lag, worse = other, tried, 0
+            if all(one is other or _clearly_worse(one, other) for one in several):
+                rests = _rests(context, found, group)
+        elif lag != 0.0 or _clearly_worse(other, found):
+            # Past the best lag the fit only gets worse. Commands that act at once leave no doubt at their first delay.
+            certain = delay and found.actuation.actuators[group[0]].direct and _clearly_worse(other, found)
+            worse += 2 if certain else 1
         else:
-            worse += lag != 0.0
-        # Past the best lag the fit only gets worse.
+            worse = 0
         if worse >= 2:
             break
     several = [best, found]
     if lag:
         # Of the steps of the grid one is larger than a period of delay, which would stand in for a lag between them.
-        several.append(_at(context, trial, best, group, delay, [lag * by for by in (1.0 / FINER, FINER)]))
+        finer = [lag * by for by in (1.0 / FINER, FINER)]
+        several += _at(context, trial, found, group, delay, finer, _rests(context, found, group))
     return max(several, key=by_evidence)
+
+
+def _clearly_worse(other: Hypothesis, than: Hypothesis) -> bool:
+    """Whether by more than chance of the search gives or takes."""
+    return than.evidence > other.evidence.less(-CLEARLY)
 
 
 def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
@@ -190,7 +204,8 @@ def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[in
     while not (now := best.actuation.actuators[group[0]]).direct and now.delay < MOST_DELAY:
         at_it: Hypothesis | None = None
         for lag in (lag for lag in reversed(LAGS) if lag * context.signals.dt <= now.lag):
-            tried = _at(context, trial, best, group, now.delay + 1, [lag])
+            several = _at(context, trial, best, group, now.delay + 1, [lag], _rests(context, best, group))
+            tried = max(several, key=by_evidence)
             if at_it is not None and max([at_it, tried], key=by_evidence) is at_it:
                 break
             at_it = tried
@@ -203,23 +218,50 @@ def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[in
 
 
 def _without(trial: Trial, best: Hypothesis) -> Hypothesis:
-    """The best so far, or a better one in which groups act at once that stood in for those searched after them."""
-    lagging = [group for group in best.alike if not best.actuation.actuators[group[0]].direct]
-    for group in lagging if len(lagging) > 1 else ():
-        best = max([best, *trial([best.actuation.at_once(group)])], key=by_evidence)
+    """The best so far, or a better one in which groups act at once that stood in for those searched after them.
+
+    And for terms that were found behind their lags, and are as good without.
+    """
+    for group in best.alike:
+        if best.actuation.actuators[group[0]].direct:
+            continue
+        best = max([best, *trial(best, [best.actuation.at_once(group)])], key=by_evidence)
     return best
 
 
+def _rests(context: Context, best: Hypothesis, group: Sequence[int]) -> list[Floats | None]:
+    """Where actuators of a group may rest before a run: where they do in the best so far, if they lag there."""
+    now = best.actuation.actuators[group[0]]
+    every = [None, *context.rests]
+    known = [rest for rest in every if now.rest == (None if rest is None else rest[group[0]])]
+    return every if now.direct else known
+
+
+def _rested(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
+    """The best so far, or a better one whose actuators rest elsewhere before a run."""
+    now = best.actuation.actuators[group[0]]
+    if now.direct:
+        return best
+    known = _rests(context, best, group)
+    others = [rest for rest in (None, *context.rests) if not any(rest is one for one in known)]
+    lag = now.lag / context.signals.dt
+    return max([best, *_at(context, trial, best, group, now.delay, [lag], others)], key=by_evidence)
+
+
 def _at(
-    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, lags: Sequence[float]
-) -> Hypothesis:
-    """The hypothesis behind the best actuators so far, those of a group with this delay: the better lag and rest."""
-    several = trial(
-        _with(best.actuation, group, lag, delay, rest, context.signals)
-        for lag in lags
-        for rest in (None, *context.rests)
+    context: Context,
+    trial: Trial,
+    best: Hypothesis,
+    group: Sequence[int],
+    delay: int,
+    lags: Sequence[float],
+    rests: Sequence[Floats | None],
+) -> list[Hypothesis]:
+    """The hypothesis behind the best actuators so far, those of a group with this delay, these lags and rests."""
+    return trial(
+        best,
+        (_with(best.actuation, group, lag, delay, rest, context.signals) for lag in lags for rest in rests),
     )
-    return max(several, key=by_evidence)
 
 
 def _with(
