@@ -37,12 +37,12 @@ MOST_DELAY = 50
 RAMPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0)
 """Periods in which an actuator crosses all commands that were sent: limits of its rate that are tried."""
 CLEARLY = 24.0
-"""Units of χ² by which lags, or limits of the rate, must be worse than none for longer and slower ones not to be tried."""
+"""Units of χ² by which lags, or limits of the rate, must be worse than none for others not to be tried."""
 GRID, RATES = 0, 1000
 """Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
 Trial = Callable[[Hypothesis | None, Iterable[Actuation]], list[Hypothesis]]
-"""The hypothesis behind each of several other actuators, with sums of the first rung that are no worse there than those of
-one that was tried before, if any: what walks find by chance on a large machine outweighs a lag."""
+"""The hypothesis behind each of several other actuators, with sums of the first rung. They are no worse there than those
+of one that was tried before, if any: what walks find by chance on a large machine outweighs a lag."""
 
 
 def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -165,9 +165,9 @@ def _best_lag(
 ) -> Hypothesis:
     """The best so far, or a better one with this delay.
 
-    From no lag on a short one may describe runs worse, and a longer one better, but not where it is clearly worse. A delay
-    has to be better soon: behind one or two periods more even runs of a machine without any find some lag that suits
-    their noise.
+    From no lag on a short one may describe runs worse, and a longer one better, but not where it is clearly worse. A
+    delay has to be better soon: behind one or two periods more even runs of a machine without any find some lag that
+    suits their noise.
     """
     (found,) = [best] if delay else trial(best, [best.actuation.at_once(group)])
     lag, worse, rests = None if delay else 0.0, 0, _rests(context, best, group)
