@@ -36,13 +36,15 @@ MOST_DELAY = 50
 """Periods beyond which no delay is tried."""
 RAMPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0)
 """Periods in which an actuator crosses all commands that were sent: limits of its rate that are tried."""
-CLEARLY = 24.0
-"""Units of χ² by which lags, or limits of the rate, must be worse than none for others not to be tried."""
+CLEARLY, SURELY = 24.0, 72.0
+"""Units of χ² by which two lags in turn, or limits of the rate, or one must be worse for others not to be tried."""
 GRID, RATES = 0, 1000
 """Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
+Group = Sequence[int]
+"""Commands that share a lag and a delay, by place."""
 Trial = Callable[[Hypothesis | None, Iterable[Actuation]], list[Hypothesis]]
-"""The hypothesis behind each of several other actuators, with sums of the first rung. They are no worse there than those
-of one that was tried before, if any: what walks find by chance on a large machine outweighs a lag."""
+"""The hypothesis behind each of several other actuators, with sums of the first rung that are no worse there than those
+of one tried before, if any: what walks find by chance on a large machine outweighs a lag."""
 
 
 def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -75,7 +77,7 @@ def without_lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesi
         yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
 
 
-def _searched(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
+def _searched(context: Context, trial: Trial, best: Hypothesis, group: Group) -> Hypothesis:
     """The best so far, or a better one with another lag or delay of a group."""
     for delay in range(context.options.longest_delay + 1):
         best = _best_lag(context, trial, best, group, delay)
@@ -95,9 +97,22 @@ def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothes
         trial = _trials(context, split, number)
         (own,) = trial(best, [best.actuation])
         for i in group:
-            own = _searched(context, trial, own, (i,))
+            own = own if _suits(context, trial, own, (i,)) else _searched(context, trial, own, (i,))
         best = max([best, own], key=by_evidence)
     return best
+
+
+def _suits(context: Context, trial: Trial, best: Hypothesis, one: Group) -> bool:
+    """Whether the lag and the delay that a command shares with others are clearly better for it than those beside."""
+    now, rests = best.actuation.actuators[one[0]], _rests(context, best, one)
+    lag = now.lag / context.signals.dt
+    near = [0.5 * lag, 2.0 * lag] if lag > 0.0 else [LAGS[2]]
+    beside = [(near, now.delay), *(([lag], now.delay + by) for by in (1, -1) if now.delay + by >= 0)]
+    return all(
+        _clearly_worse(other, best)
+        for lags, delay in beside
+        for other in _at(context, trial, best, one, delay, lags, rests)
+    )
 
 
 def _at_limited_rates(context: Context, best: Hypothesis) -> Hypothesis:
@@ -116,17 +131,15 @@ def _at_limited_rates(context: Context, best: Hypothesis) -> Hypothesis:
             if other.evidence > best.evidence:
                 best, found = other, periods
             # Past the true rate the fit only gets worse, and without a limit from the first one on.
-            worse = worse + 1 if _clearly_worse(other, best) else 0
-            if worse == 2:
+            worse = _worse(worse, other, best)
+            if worse >= 2:
                 break
         for periods in (found / FINER, found * FINER) if found is not None else ():
             best = max([best, _ramped(context, trial, best, group, periods / span)], key=by_evidence)
     return best
 
 
-def _ramped(
-    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], periods: float
-) -> Hypothesis:
+def _ramped(context: Context, trial: Trial, best: Hypothesis, group: Group, periods: float) -> Hypothesis:
     """The hypothesis behind actuators of a group that move by one unit of its command in so many periods at least."""
     several = []
     now = best.actuation.actuators[group[0]].lag
@@ -160,9 +173,7 @@ def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int], of:
     return trial
 
 
-def _best_lag(
-    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int
-) -> Hypothesis:
+def _best_lag(context: Context, trial: Trial, best: Hypothesis, group: Group, delay: int) -> Hypothesis:
     """The best so far, or a better one with this delay.
 
     From no lag on a short one may describe runs worse, and a longer one better, but not where it is clearly worse. A
@@ -178,12 +189,14 @@ def _best_lag(
             found, lag, worse = other, tried, 0
             if all(one is other or _clearly_worse(one, other) for one in several):
                 rests = _rests(context, found, group)
-        elif lag != 0.0 or _clearly_worse(other, found):
-            # Past the best lag the fit only gets worse. Commands that act at once leave no doubt at their first delay.
-            certain = delay and found.actuation.actuators[group[0]].direct and _clearly_worse(other, found)
-            worse += 2 if certain else 1
+        elif lag == 0.0:
+            worse = _worse(worse, other, found)
+        elif lag is None:
+            # Commands that act at once leave no doubt at their first delay.
+            worse += 2 if found.actuation.actuators[group[0]].direct and _clearly_worse(other, found) else 1
         else:
-            worse = 0
+            # Past the best lag the fit only gets worse.
+            worse = max(worse + 1, _worse(worse, other, found))
         if worse >= 2:
             break
     several = [best, found]
@@ -194,12 +207,19 @@ def _best_lag(
     return max(several, key=by_evidence)
 
 
-def _clearly_worse(other: Hypothesis, than: Hypothesis) -> bool:
+def _clearly_worse(other: Hypothesis, than: Hypothesis, by: float = CLEARLY) -> bool:
     """Whether by more than chance of the search gives or takes."""
-    return than.evidence > other.evidence.less(-CLEARLY)
+    return than.evidence > other.evidence.less(-by)
 
 
-def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
+def _worse(before: int, other: Hypothesis, than: Hypothesis) -> int:
+    """How many in turn are clearly worse, one more among them; one that surely is counts twice."""
+    if _clearly_worse(other, than, SURELY):
+        return before + 2
+    return before + 1 if _clearly_worse(other, than) else 0
+
+
+def _longer(context: Context, trial: Trial, best: Hypothesis, group: Group) -> Hypothesis:
     """The same, or one with a longer delay, for as long as a period more is better with a lag that is no longer."""
     while not (now := best.actuation.actuators[group[0]]).direct and now.delay < MOST_DELAY:
         at_it: Hypothesis | None = None
@@ -229,7 +249,7 @@ def _without(trial: Trial, best: Hypothesis) -> Hypothesis:
     return best
 
 
-def _rests(context: Context, best: Hypothesis, group: Sequence[int]) -> list[Floats | None]:
+def _rests(context: Context, best: Hypothesis, group: Group) -> list[Floats | None]:
     """Where actuators of a group may rest before a run: where they do in the best so far, if they lag there."""
     now = best.actuation.actuators[group[0]]
     every = [None, *context.rests]
@@ -237,7 +257,7 @@ def _rests(context: Context, best: Hypothesis, group: Sequence[int]) -> list[Flo
     return every if now.direct else known
 
 
-def _rested(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
+def _rested(context: Context, trial: Trial, best: Hypothesis, group: Group) -> Hypothesis:
     """The best so far, or a better one whose actuators rest elsewhere before a run."""
     now = best.actuation.actuators[group[0]]
     if now.direct:
@@ -252,7 +272,7 @@ def _at(
     context: Context,
     trial: Trial,
     best: Hypothesis,
-    group: Sequence[int],
+    group: Group,
     delay: int,
     lags: Sequence[float],
     rests: Sequence[Floats | None],
@@ -265,7 +285,7 @@ def _at(
 
 
 def _with(
-    base: Actuation, group: Sequence[int], lag: float, delay: int, rest: Floats | None, signals: Signals
+    base: Actuation, group: Group, lag: float, delay: int, rest: Floats | None, signals: Signals
 ) -> Actuation:
     """Actuators of which those of a group lag and delay."""
     actuators: list[Actuator] = list(base.actuators)

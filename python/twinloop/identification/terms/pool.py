@@ -124,8 +124,10 @@ class Pool(Expressions, Recorded, kind="pool"):
 
     def rung(self, numbers: Iterable[int]) -> int:
         """The highest rung of the ladder that some terms stand on; one above all for what was evolved."""
-        top = max(self.rungs.values(), default=-1) + 1
-        return max((self.rungs.get(number, top) for number in numbers), default=0)
+        asked = [self.rungs.get(number) for number in numbers]
+        known = [rung for rung in asked if rung is not None]
+        evolved = len(known) < len(asked)
+        return max(self.rungs.values(), default=-1) + 1 if evolved else max(known, default=0)
 
     def hidden(self, number: int) -> int:
         """The node of a hidden state: a further input, where a model has one."""
