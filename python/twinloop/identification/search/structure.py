@@ -88,7 +88,14 @@ class Sum(Recorded, kind="sum"):
         return found
 
 
-def prices(pool: Pool, terms: Sequence[int], readings: int, runs: int) -> Floats:
+def prices(
+    pool: Pool,
+    terms: Sequence[int],
+    readings: int,
+    runs: int,
+    favoured: Mapping[int, float] | None = None,
+    forbidden: Container[int] = (),
+) -> Floats:
     """What each term costs, in units of χ²: a coefficient, and the description of its expression.
 
     Args:
@@ -97,17 +104,18 @@ def prices(pool: Pool, terms: Sequence[int], readings: int, runs: int) -> Floats
         readings: whose number gives a coefficient's precision.
         runs: that they are of. Many resemble one another: what a law that is not quite right leaves on one it leaves on
             all, and what explains it gains with each without being any truer. So prices rise with their number.
+        favoured: description lengths in nats of terms that are known from elsewhere.
+        forbidden: terms that nothing can pay for.
 
     Returns:
         Prices (terms,).
     """
-    return _prices([pool.length(term) for term in terms], readings, runs)
-
-
-def _prices(lengths: Sequence[float], readings: int, runs: int) -> Floats:
-    """The same of description lengths in nats."""
+    known = favoured or {}
+    lengths = [known[term] if term in known else pool.length(term) for term in terms]
     costs: Floats = log(max(readings, 2)) + 2.0 * np.array(lengths)
-    return costs * power(max(1.0, runs / FEW_RUNS), RESEMBLANCE)
+    return np.where(
+        [term in forbidden for term in terms], np.inf, costs * power(max(1.0, runs / FEW_RUNS), RESEMBLANCE)
+    )
 
 
 def priced(pool: Pool, terms: Sequence[int], readings: int, runs: int) -> float:
@@ -246,16 +254,21 @@ def _posed(
     forbidden: Sequence[Container[int]] = (),
 ) -> list[_Searched]:
     """What is searched for each chain, among terms that are usable."""
-    lengths = [problem.pool.length(term) for term in usable]
-
-    def priced(chain: Chain, elsewhere: Mapping[int, float], out: Container[int]) -> Floats:
-        """What each term costs a chain: what is known from elsewhere has another length, what is out is never paid."""
-        own = [elsewhere.get(term, length) for term, length in zip(usable, lengths, strict=True)]
-        costs = _prices(own, problem.readings(chain), len(problem.runs))
-        return np.where([term in out for term in usable], np.inf, costs)
-
+    lengths = {term: problem.pool.length(term) for term in usable}
     return [
-        _Searched(chain, other, priced(chain, elsewhere, out), precisions(problem, chain, usable))
+        _Searched(
+            chain,
+            other,
+            prices(
+                problem.pool,
+                usable,
+                problem.readings(chain),
+                len(problem.runs),
+                {**lengths, **elsewhere},
+                out,
+            ),
+            precisions(problem, chain, usable),
+        )
         for chain, other, elsewhere, out in zip(
             chains, known, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
         )
