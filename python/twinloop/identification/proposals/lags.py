@@ -37,7 +37,8 @@ MOST_DELAY = 50
 RAMPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0)
 """Periods in which an actuator crosses all commands that were sent: limits of its rate that are tried."""
 CLEARLY, SURELY = 24.0, 72.0
-"""Units of χ² by which two lags in turn, or limits of the rate, or one must be worse for others not to be tried."""
+"""Units of χ² by which each of two in turn, or a single one, must be worse than the best lag, or the best limit of the
+rate, for no others to be tried."""
 GRID, RATES = 0, 1000
 """Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
 Group = Sequence[int]
@@ -192,7 +193,7 @@ def _best_lag(context: Context, trial: Trial, best: Hypothesis, group: Group, de
         elif lag == 0.0:
             worse = _worse(worse, other, found)
         elif lag is None:
-            # Commands that act at once leave no doubt at their first delay.
+            # Where commands act at once, a delay alone is clearly worse.
             worse += 2 if found.actuation.actuators[group[0]].direct and _clearly_worse(other, found) else 1
         else:
             # Past the best lag the fit only gets worse.
@@ -213,7 +214,7 @@ def _clearly_worse(other: Hypothesis, than: Hypothesis, by: float = CLEARLY) -> 
 
 
 def _worse(before: int, other: Hypothesis, than: Hypothesis) -> int:
-    """How many in turn are clearly worse, one more among them; one that surely is counts twice."""
+    """How many in turn are clearly worse, once another is counted; one that is worse by far counts twice."""
     if _clearly_worse(other, than, SURELY):
         return before + 2
     return before + 1 if _clearly_worse(other, than) else 0
