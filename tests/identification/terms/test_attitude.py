@@ -12,7 +12,7 @@ from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
-from twinloop.identification.terms.attitude import attitude, tilted, tilts
+from twinloop.identification.terms.attitude import attitude, carried, tilted, tilts
 from twinloop.identification.terms.directions import of_mixer, terms_of, together
 from twinloop.identification.terms.pool import Pool
 
@@ -46,6 +46,42 @@ def test_without_velocities_or_a_body_nothing_is_turned():
     assert tilts(Pool(10), body(velocities=())) == []
     plain = tl.Signals([tl.State("climb", "m/s", 3.0)], [tl.Command("u", "1", (0.0, 1.0))], 0.02)
     assert attitude(Pool(2), plain) == []
+
+
+def placed(units=("m", "m", "m", "m/s", "m/s", "m/s"), attitude=True):
+    """Signals of a body with further states of these units, places first, and one command."""
+    states = [tl.State(name, "rad", 1.0) for name in ANGLES]
+    states += [tl.State(name, "rad/s", 3.0) for name in RATES]
+    states += [tl.State(f"s{i}", unit, 1.0) for i, unit in enumerate(units)]
+    body = tl.RigidBody(ANGLES, RATES) if attitude else None
+    return tl.Signals(states, [tl.Command("u", "N", (-1.0, 1.0))], 0.1, kinematics=body)
+
+
+@given(
+    st.lists(st.floats(-1.4, 1.4), min_size=3, max_size=3),
+    st.lists(st.floats(-9.0, 9.0), min_size=3, max_size=3),
+)
+def test_places_change_by_the_velocity_of_the_body_as_its_pose_turns_it(pose, velocity):
+    signals, pool = placed(), Pool(13)
+    row = np.array([[*pose, *[0.0] * 6, *velocity, 0.0]])
+    turned = Rotation.from_euler("ZYX", pose[::-1]).apply(velocity)
+    np.testing.assert_allclose(pool.values(carried(pool, signals), row)[0], turned, atol=1e-13)
+    assert [pool.length(node) for node in carried(pool, signals)] == [pool.length(0)] * 3
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        placed(units=("m", "m/s", "m/s")),
+        placed(units=("m", "m/s", "m/s", "m/s", "m/s")),
+        placed(units=("m", "km/s", "km/s", "km/s")),
+        placed(units=("rad",)),
+        placed(attitude=False),
+    ],
+    ids=["two velocities", "four velocities", "other units", "an angle beside the rates", "no body"],
+)
+def test_velocities_that_may_not_be_those_of_the_body_are_not_turned(signals):
+    assert carried(Pool(len(signals.states) + 1), signals) == []
 
 
 def test_a_tilt_is_as_short_as_an_input_and_times_a_command_as_a_product_of_two():

@@ -1,17 +1,50 @@
-"""Attitude: how the pose of a rigid body turns its weight and its thrust, where velocities are logged beside it.
+"""Attitude: how the pose of a rigid body turns its weight, its thrust and its velocity, where velocities are logged.
 
 Along the earth's axes a body is driven by its thrust, which its pose turns; along its own by its weight, which its
-pose turns the other way. Written out such a term has two or three sines and cosines times a command. It is one choice
-among few, and needed by every machine that flies.
+pose turns the other way. A place changes by the velocity, turned where that is logged along the body's axes, as that
+of a vehicle under water is. Written out such a term has two or three sines and cosines times a command, or seven times
+velocities. It is one choice among few, and needed by every machine that flies or dives.
 """
 
 from __future__ import annotations
 
 from itertools import product
+from typing import NamedTuple
 
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import alike_commands
 from twinloop.signals import Signals
+
+
+class Waves(NamedTuple):
+    """Nodes of the sines and cosines of roll, pitch and yaw."""
+
+    sin_roll: int
+    sin_pitch: int
+    sin_yaw: int
+    cos_roll: int
+    cos_pitch: int
+    cos_yaw: int
+
+
+def _waves(pool: Pool, signals: Signals) -> Waves | None:
+    """Of the angles of a rigid body; None without one, or where nothing but its rates is driven."""
+    body, names = signals.kinematics, signals.state_names
+    if body is None or all(names[i] in body.rates for i in signals.driven):
+        return None
+    angles = [names.index(name) for name in body.angles]
+    return Waves(
+        *(pool.wave(function, i, signals.states[i].period) for function in ("sin", "cos") for i in angles)
+    )
+
+
+def _along_the_earth(pool: Pool, waves: Waves) -> tuple[int, int]:
+    """Of the body's vertical, what points along the earth's two horizontal axes."""
+    forward = pool.product(waves.cos_roll, waves.sin_pitch)
+    return (
+        pool.add("+", pool.product(forward, waves.cos_yaw), pool.product(waves.sin_roll, waves.sin_yaw)),
+        pool.add("-", pool.product(forward, waves.sin_yaw), pool.product(waves.sin_roll, waves.cos_yaw)),
+    )
 
 
 def tilts(pool: Pool, signals: Signals) -> list[int]:
@@ -20,29 +53,80 @@ def tilts(pool: Pool, signals: Signals) -> list[int]:
     The last of the first three is the body's vertical along the earth's, too; signs are those of the terms' weights.
     None without the angles of a rigid body, or where nothing but its rates is driven.
     """
-    body, names = signals.kinematics, signals.state_names
-    if body is None or all(names[i] in body.rates for i in signals.driven):
+    waves = _waves(pool, signals)
+    if waves is None:
         return []
-    waves = [
-        [
-            pool.wave(function, names.index(name), signals.states[names.index(name)].period)
-            for name in body.angles
-        ]
-        for function in ("sin", "cos")
-    ]
-    (sin_roll, sin_pitch, sin_yaw), (cos_roll, cos_pitch, cos_yaw) = waves
-    forward = pool.product(cos_roll, sin_pitch)
     found = [
-        sin_pitch,
-        pool.product(sin_roll, cos_pitch),
-        pool.product(cos_roll, cos_pitch),
-        pool.add("+", pool.product(forward, cos_yaw), pool.product(sin_roll, sin_yaw)),
-        pool.add("-", pool.product(forward, sin_yaw), pool.product(sin_roll, cos_yaw)),
+        waves.sin_pitch,
+        pool.product(waves.sin_roll, waves.cos_pitch),
+        pool.product(waves.cos_roll, waves.cos_pitch),
+        *_along_the_earth(pool, waves),
     ]
     for tilt in found:
         # As short as an input.
         pool.found.setdefault(tilt, pool.length(0))
     return found
+
+
+def carried(pool: Pool, signals: Signals) -> list[int]:
+    """Nodes of the body's velocity along the earth's axes, by which places change; three, or none.
+
+    There are three where exactly three states have the unit of a place that is driven, per second: they are taken for
+    the velocity along the body's axes, forward, sideways and along its vertical, in this order. Where they are along
+    the earth's already, the place changes by one of them alone, which is as short. The last one's sign is that of a
+    place along the body's vertical; the other is that of the term's weight.
+    """
+    waves = _waves(pool, signals)
+    velocities = _velocities(signals)
+    if waves is None or not velocities:
+        return []
+    sin_roll, sin_pitch, sin_yaw, cos_roll, cos_pitch, cos_yaw = waves
+    down = pool.product(sin_roll, sin_pitch)
+    north, east = _along_the_earth(pool, waves)
+    turns = [
+        [
+            pool.product(cos_pitch, cos_yaw),
+            pool.add("-", pool.product(down, cos_yaw), pool.product(cos_roll, sin_yaw)),
+            north,
+        ],
+        [
+            pool.product(cos_pitch, sin_yaw),
+            pool.add("+", pool.product(down, sin_yaw), pool.product(cos_roll, cos_yaw)),
+            east,
+        ],
+    ]
+    found = []
+    for row in turns:
+        ahead, aside, below = (pool.product(turn, v) for turn, v in zip(row, velocities, strict=True))
+        found.append(pool.add("+", pool.add("+", ahead, aside), below))
+    ahead, aside, below = velocities
+    level = pool.add(
+        "+",
+        pool.product(pool.product(sin_roll, cos_pitch), aside),
+        pool.product(pool.product(cos_roll, cos_pitch), below),
+    )
+    found.append(pool.add("-", level, pool.product(sin_pitch, ahead)))
+    for place in found:
+        # As short as an input.
+        pool.found.setdefault(place, pool.length(0))
+    return found
+
+
+def _velocities(signals: Signals) -> list[int]:
+    """The only three states with the unit of a driven place per second that are no rates of the body; else none."""
+    body = signals.kinematics
+    turning = () if body is None else body.rates
+
+    def of(unit: str) -> list[int]:
+        return [
+            i
+            for i, state in enumerate(signals.states)
+            if state.unit == f"{unit}/s" and state.name not in turning
+        ]
+
+    units = dict.fromkeys(signals.states[i].unit for i in signals.driven)
+    found = [velocities for unit in units if len(velocities := of(unit)) == 3]
+    return found[0] if len(found) == 1 else []
 
 
 def tilted(pool: Pool, tilt: int, command: int) -> list[int]:
@@ -54,7 +138,11 @@ def tilted(pool: Pool, tilt: int, command: int) -> list[int]:
 
 
 def attitude(pool: Pool, signals: Signals) -> list[int]:
-    """Tilts, alone and times each command that has none alike; of those that have, directions are turned."""
+    """Tilts, alone and times each command that has none alike, and the velocity along the earth's axes.
+
+    Of commands that have alike ones, directions are turned.
+    """
     found = tilts(pool, signals)
     single = [signals.n_x + group[0] for group in alike_commands(signals) if len(group) == 1]
-    return [*found, *(node for pair in product(found, single) for node in tilted(pool, *pair))]
+    turned = [node for pair in product(found, single) for node in tilted(pool, *pair)]
+    return [*found, *turned, *carried(pool, signals)]
