@@ -71,7 +71,7 @@ ABLATIONS: dict[str, Ablation] = {
         "the upper rungs of the ladder of libraries", {"libraries": ("linear", "quadratic", "damping")}
     ),
     "attitude": Ablation(
-        "thrust and weight of a rigid body, turned by its pose, as one term",
+        "thrust, weight and velocity of a rigid body, turned by its pose, as one term each",
         {"libraries": tuple(name for name in LIBRARIES if name != "attitude")},
     ),
     "directions": Ablation("directions of alike commands, as one term", {"directions": False}),

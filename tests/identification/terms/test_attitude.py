@@ -1,4 +1,4 @@
-"""Attitude: a body's pose turns its thrust and its weight, whoever computes the rotation."""
+"""Attitude: a body's pose turns its thrust, its weight and its velocity, whoever computes the rotation."""
 
 import numpy as np
 import pytest
