@@ -9,10 +9,14 @@ from scipy.spatial.transform import Rotation
 
 import twinloop as tl
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
-from twinloop.identification.terms.attitude import attitude, carried, tilted, tilts
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.starts import ANEW, begun
+from twinloop.identification.terms.attitude import attitude, carried, tilted, tilts, turned
 from twinloop.identification.terms.directions import of_mixer, terms_of, together
 from twinloop.identification.terms.pool import Pool
 
@@ -91,6 +95,27 @@ def test_a_tilt_is_as_short_as_an_input_and_times_a_command_as_a_product_of_two(
     assert [pool.length(node) for node in tilted(pool, tilt, 7)] == [pool.length(pool.product(0, 7))] * 2
     # Five tilts, alone and times the thrust and its square.
     assert len(set(attitude(pool, signals))) == 15
+
+
+def test_what_a_pose_turns_is_short_for_velocities_and_as_long_as_it_is_written_for_rates():
+    """The weight that rights a body is short for both: it is no thrust, and no yaw turns it."""
+    signals = body(velocities=("north", "east", "fall"), rotors=1)
+    run = Run.of(np.zeros((20, 9)), np.zeros((19, 1)))
+    context = Context([run], signals, options_of("default", {}), Unit(0), _core.Workers(1))
+    first = begun(context, "acceleration", context.first_pool(), ANEW)
+    problem, pool = Problem(context, first), first.pool
+    sin_pitch, aside, down, north, east = tilts(pool, signals)
+    lift = tilted(pool, north, 9)
+    short = [pool.one, 0, 9, pool.product(0, 9), sin_pitch, aside, down]
+    assert turned(pool, signals, [*short, north, east, *lift]) == {north, east, *lift}
+    for chain in first.driven:
+        names = [signals.state_names[i] for i in chain.states]
+        found = problem.as_written(chain, [*short, *lift])
+        if names[0] in RATES:
+            assert sorted(found) == sorted(lift)
+            assert all(found[node] > 3.0 * pool.length(node) for node in lift)
+        else:
+            assert found == {}
 
 
 def test_commands_that_pull_together_are_turned_and_those_against_each_other_are_not():

@@ -12,6 +12,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.poles import room
 from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.attitude import turned
 from twinloop.signals import Bounds
 
 if TYPE_CHECKING:
@@ -51,6 +52,10 @@ class Problem:
         self._varied: dict[int, float] = dict(bare._varied) if bare else {}
         self._feedthrough: dict[tuple[int, int], Floats] = dict(bare._feedthrough) if bare else {}
         self._usable: set[int] = set(bare._usable) if bare else set()
+        self._signals = signals
+        body = signals.kinematics
+        self._rates = set() if body is None else {signals.state_names.index(name) for name in body.rates}
+        self._turned: dict[int, bool] = dict(bare._turned) if bare else {}
 
     def usable(self, terms: Sequence[int]) -> list[int]:
         """Terms whose values are finite on all rows, with the values; those of a hidden state only where one is."""
@@ -66,6 +71,18 @@ class Problem:
                 if np.abs(self._values[term]).max() < 1e100:
                     self._usable.add(term)
         return [term for term in terms if term in self._usable]
+
+    def as_written(self, chain: Chain, terms: Sequence[int]) -> dict[int, float]:
+        """Lengths in nats of terms that are short for other chains, and for this one as long as they are written.
+
+        For the rates of a rigid body these are thrusts and velocities that its pose turns.
+        """
+        if self._rates.isdisjoint(chain.states):
+            return {}
+        if new := [term for term in terms if term not in self._turned]:
+            among = turned(self.pool, self._signals, new)
+            self._turned.update((term, term in among) for term in new)
+        return {term: self.pool.written(term) for term in terms if self._turned[term]}
 
     def values(self, terms: Sequence[int]) -> Columns:
         """Of terms that were found usable, at the start, the middle and the end of each period (3, rows, terms)."""

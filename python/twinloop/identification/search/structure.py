@@ -264,7 +264,7 @@ def _posed(
                 usable,
                 problem.readings(chain),
                 len(problem.runs),
-                {**lengths, **elsewhere},
+                {**lengths, **problem.as_written(chain, usable), **elsewhere},
                 out,
             ),
             precisions(problem, chain, usable),

@@ -8,11 +8,13 @@ velocities. It is one choice among few, and needed by every machine that flies o
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import product
 from typing import NamedTuple
 
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import alike_commands
+from twinloop.law.expressions import INPUT
 from twinloop.signals import Signals
 
 
@@ -45,6 +47,26 @@ def _along_the_earth(pool: Pool, waves: Waves) -> tuple[int, int]:
         pool.add("+", pool.product(forward, waves.cos_yaw), pool.product(waves.sin_roll, waves.sin_yaw)),
         pool.add("-", pool.product(forward, waves.sin_yaw), pool.product(waves.sin_roll, waves.cos_yaw)),
     )
+
+
+def turned(pool: Pool, signals: Signals, terms: Iterable[int]) -> set[int]:
+    """Of terms those by which a pose turns a thrust or a velocity: short, for they drive velocities and places.
+
+    They drive no rates of a body: what does is fixed to it, or its weight, which no yaw turns. Where a law lacks much,
+    such terms would stand in for it there, at the price of an input.
+    """
+    body, waves = signals.kinematics, _waves(pool, signals)
+    if body is None or waves is None:
+        return set()
+    angles = {signals.state_names.index(name) for name in body.angles}
+    yaw, found = {waves.sin_yaw, waves.cos_yaw}, set()
+    for term in terms:
+        if term in pool.found:
+            parts = set(pool.needed([term]))
+            others = {part for part in parts if pool[part].operation == INPUT} - angles
+            if not parts.isdisjoint(yaw) or (others and not parts.isdisjoint(waves)):
+                found.add(term)
+    return found
 
 
 def tilts(pool: Pool, signals: Signals) -> list[int]:

@@ -193,7 +193,7 @@ class Pool(Expressions, Recorded, kind="pool"):
         """
         if number in self.found:
             return self.found[number]
-        written = self._written(number)
+        written = self.written(number)
         return written if self._parts(number).isdisjoint(self.found) else written + self._owed(number)
 
     def _parts(self, number: int) -> frozenset[int]:
@@ -208,12 +208,13 @@ class Pool(Expressions, Recorded, kind="pool"):
         owed = 0.0
         for operand in self[number].operands:
             if operand in self.found and self[operand].operation not in NO_PARTS:
-                owed += max(0.0, self.found[operand] - self._written(operand))
+                owed += max(0.0, self.found[operand] - self.written(operand))
             else:
                 owed += self._owed(operand)
         return owed
 
-    def _written(self, number: int) -> float:
+    def written(self, number: int) -> float:
+        """Description length in nats of an expression as it is written, whatever it was found among."""
         if number not in self._lengths:
             self._lengths[number] = self._as_written(number)
         return self._lengths[number]
