@@ -72,8 +72,7 @@ def test_every_code_of_a_remark_is_explained():
 
 
 def test_the_page_on_the_dashboard_quotes_what_is_said_of_a_writer_that_was_killed():
-    doing = {"told": 1, "experiments": 2, "left": None, "phase": "terms", "generation": 1, "generations": 2}
-    said = in_words(Doing(doing, LOST + 1.0))
+    said = in_words(Doing("terms", 1, 2, told=1, experiments=2, left=None, silent=LOST + 1.0))
     text = " ".join((DOCS / "dashboard.md").read_text("utf-8").split())
     quoted = re.search(r'after two minutes "(.*?)…(.*?)"', text)
     assert quoted is not None and LOST == 120.0 and all(words in said for words in quoted.groups())

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from typing import get_type_hints
 
-from twinloop.records import Record
+from twinloop.records import Record, read
 from twinloop.store.columns import moment_in, record_in
 from twinloop.store.database import Store
 
@@ -15,12 +16,40 @@ class Doing:
     """What the writer of a campaign has said last that it does.
 
     Args:
-        record: of its progress.
+        phase: of its work, as in `Progress`.
+        generation: or step of the phase.
+        generations: or steps that it has.
+        told: number of experiments so far.
+        experiments: that there will be.
+        left: remaining seconds; None as long as they are unknown.
         silent: seconds since then, by the clocks of both; a writer that was killed stays silent for good.
     """
 
-    record: Record
-    silent: float
+    phase: str
+    generation: int
+    generations: int
+    told: int
+    experiments: int
+    left: float | None
+    silent: float = 0.0
+
+    @classmethod
+    def of(cls, record: Record, silent: float, where: str) -> Doing:
+        """What a writer has said.
+
+        Args:
+            record: of its progress.
+            silent: seconds since then.
+            where: it stands, for an error.
+
+        Raises:
+            InvalidInput: a record that lacks something, or has something of another type.
+        """
+        hints = get_type_hints(cls)
+        said = {
+            name: read(hints[name], record.get(name), f"{where}.{name}") for name in hints if name != "silent"
+        }
+        return cls(**said, silent=silent)
 
 
 def state(store: Store, name: str) -> str:
@@ -72,4 +101,5 @@ def doing(store: Store, name: str) -> Doing | None:
     what = f"Store {store.name}, campaign {name}"
     said = datetime.fromisoformat(moment_in("progress.said", row.said, what))
     silent = (datetime.now(timezone.utc) - said).total_seconds()
-    return Doing(record_in("progress.record", row.record, what), max(0.0, silent))
+    record = record_in("progress.record", row.record, what)
+    return Doing.of(record, max(0.0, silent), f"of {what}, progress.record")

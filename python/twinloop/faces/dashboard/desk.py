@@ -324,17 +324,18 @@ def in_words(seen: Doing) -> str:
     Args:
         seen: in the store.
     """
-    record = seen.record
-    done, experiments, remaining = record["told"], record["experiments"], record["left"]
-    phase, step, steps = str(record["phase"]), record["generation"], record["generations"]
-    if phase == "experiment":
-        said = f"flying experiment {done + 1} of {experiments}"
+    if seen.phase == "experiment":
+        said = f"flying experiment {seen.told + 1} of {seen.experiments}"
     else:
         names = {"models": "evolving models", "tests": "evolving tests"}
-        what, turn = (USUAL[phase][0], "step") if phase in USUAL else (names.get(phase, phase), "generation")
-        said = f"{what}, {turn} {step} of {steps}; experiments recorded: {done} of {experiments}"
-    if remaining is not None:
-        said += f"; about {duration(remaining)} left"
+        known = USUAL.get(seen.phase)
+        what, turn = (known[0], "step") if known else (names.get(seen.phase, seen.phase), "generation")
+        said = (
+            f"{what}, {turn} {seen.generation} of {seen.generations};"
+            f" experiments recorded: {seen.told} of {seen.experiments}"
+        )
+    if seen.left is not None:
+        said += f"; about {duration(seen.left)} left" if seen.left >= 0.5 else "; nearly done"
     if seen.silent > LOST:
         said += f"; no progress for {duration(seen.silent)}, it may have stopped"
     return f"Working: {said}."
