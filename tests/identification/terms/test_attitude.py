@@ -97,23 +97,33 @@ def test_a_tilt_is_as_short_as_an_input_and_times_a_command_as_a_product_of_two(
     assert len(set(attitude(pool, signals))) == 15
 
 
-def test_what_a_pose_turns_is_short_for_velocities_and_as_long_as_it_is_written_for_rates():
+@pytest.mark.parametrize(
+    ("signals", "along"),
+    [
+        (body(velocities=("north", "east", "fall"), rotors=1), RATES),
+        (placed(), (*RATES, "s3", "s4", "s5")),
+    ],
+    ids=["velocities along the earth's axes", "velocities along the body's axes"],
+)
+def test_what_a_pose_turns_is_short_along_the_earth_and_as_long_as_it_is_written_along_the_body(
+    signals, along
+):
     """The weight that rights a body is short for both: it is no thrust, and no yaw turns it."""
-    signals = body(velocities=("north", "east", "fall"), rotors=1)
-    run = Run.of(np.zeros((20, 9)), np.zeros((19, 1)))
+    run = Run.of(np.zeros((20, signals.n_x)), np.zeros((19, 1)))
     context = Context([run], signals, options_of("default", {}), Unit(0), _core.Workers(1))
     first = begun(context, "acceleration", context.first_pool(), ANEW)
     problem, pool = Problem(context, first), first.pool
     sin_pitch, aside, down, north, east = tilts(pool, signals)
-    lift = tilted(pool, north, 9)
-    short = [pool.one, 0, 9, pool.product(0, 9), sin_pitch, aside, down]
-    assert turned(pool, signals, [*short, north, east, *lift]) == {north, east, *lift}
+    command = signals.n_x
+    long = [*tilted(pool, north, command), *carried(pool, signals)]
+    short = [pool.one, 0, command, pool.product(0, command), sin_pitch, aside, down]
+    assert turned(pool, signals, [*short, north, east, *long]) == {north, east, *long}
     for chain in first.driven:
         names = [signals.state_names[i] for i in chain.states]
-        found = problem.as_written(chain, [*short, *lift])
-        if names[0] in RATES:
-            assert sorted(found) == sorted(lift)
-            assert all(found[node] > 3.0 * pool.length(node) for node in lift)
+        found = problem.as_written(chain, [*short, *long])
+        if names[0] in along:
+            assert sorted(found) == sorted(long)
+            assert all(found[node] > 3.0 * pool.length(node) for node in long)
         else:
             assert found == {}
 

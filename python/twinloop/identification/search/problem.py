@@ -12,7 +12,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.poles import room
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.terms.attitude import turned
+from twinloop.identification.terms.attitude import along_the_body, turned
 from twinloop.signals import Bounds
 
 if TYPE_CHECKING:
@@ -53,8 +53,7 @@ class Problem:
         self._feedthrough: dict[tuple[int, int], Floats] = dict(bare._feedthrough) if bare else {}
         self._usable: set[int] = set(bare._usable) if bare else set()
         self._signals = signals
-        body = signals.kinematics
-        self._rates = set() if body is None else {signals.state_names.index(name) for name in body.rates}
+        self._along_the_body = along_the_body(signals)
         self._turned: dict[int, bool] = dict(bare._turned) if bare else {}
 
     def usable(self, terms: Sequence[int]) -> list[int]:
@@ -75,9 +74,9 @@ class Problem:
     def as_written(self, chain: Chain, terms: Sequence[int]) -> dict[int, float]:
         """Lengths in nats of terms that are short for other chains, and for this one as long as they are written.
 
-        For the rates of a rigid body these are thrusts and velocities that its pose turns.
+        Along the axes of a rigid body these are thrusts and velocities that its pose turns.
         """
-        if self._rates.isdisjoint(chain.states):
+        if self._along_the_body.isdisjoint(chain.states):
             return {}
         if new := [term for term in terms if term not in self._turned]:
             among = turned(self.pool, self._signals, new)

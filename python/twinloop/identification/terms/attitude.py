@@ -49,11 +49,18 @@ def _along_the_earth(pool: Pool, waves: Waves) -> tuple[int, int]:
     )
 
 
+def along_the_body(signals: Signals) -> set[int]:
+    """Rates of a rigid body, and its velocities where they are logged along its axes, beside places that they change."""
+    if signals.kinematics is None:
+        return set()
+    return {signals.state_names.index(name) for name in signals.kinematics.rates} | set(_velocities(signals))
+
+
 def turned(pool: Pool, signals: Signals, terms: Iterable[int]) -> set[int]:
     """Of terms those by which a pose turns a thrust or a velocity: short, for they drive velocities and places.
 
-    They drive no rates of a body: what does is fixed to it, or its weight, which no yaw turns. Where a law lacks much,
-    such terms would stand in for it there, at the price of an input.
+    They drive nothing along the body's axes: what does is fixed to it, or its weight, which no yaw turns. Where a law
+    lacks much, such terms would stand in for it there, at the price of an input.
     """
     body, waves = signals.kinematics, _waves(pool, signals)
     if body is None or waves is None:
@@ -136,8 +143,7 @@ def carried(pool: Pool, signals: Signals) -> list[int]:
 
 def _velocities(signals: Signals) -> list[int]:
     """The only three states with the unit of a driven place per second that are no rates of the body; else none."""
-    body = signals.kinematics
-    turning = () if body is None else body.rates
+    turning = () if signals.kinematics is None else signals.kinematics.rates
 
     def of(unit: str) -> list[int]:
         return [
