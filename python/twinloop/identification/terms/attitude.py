@@ -50,7 +50,7 @@ def _along_the_earth(pool: Pool, waves: Waves) -> tuple[int, int]:
 
 
 def along_the_body(signals: Signals) -> set[int]:
-    """Rates of a rigid body, and its velocities where they are logged along its axes, beside places that they change."""
+    """Rates of a rigid body, and its velocities where they are logged along its axes, beside places they change."""
     if signals.kinematics is None:
         return set()
     return {signals.state_names.index(name) for name in signals.kinematics.rates} | set(_velocities(signals))
