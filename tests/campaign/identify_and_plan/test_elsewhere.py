@@ -58,7 +58,7 @@ def slowly(members, before, asked):
     for each in genes:
         test = tl.Test(asked.family, each, asked.initial_state, asked.target_state, asked.steps)
         first, *others, known = (fly(model, test, limits=asked.limits) for model in (*members, before))
-        if any(run.ended == "completed" for run in (first, *others)):
+        if any(run.ended == "completed" for run in (first, *others, known)):
             drawn += 1
             parted = [part(first, other) for other in others]
             apart += sum(parted) > len(parted) / 2
@@ -82,6 +82,13 @@ def test_what_is_known_well_is_the_same_everywhere_and_what_is_not_is_apart():
     assert elsewhere([near, law(1.01)], law(1.02), setup(), UNIT, WORKERS)[1:] == (0, 0)
     assert elsewhere([near, far, far], near, setup(), UNIT, WORKERS).apart > DRAWN / 2
     assert elsewhere([near, near], far, setup(), UNIT, WORKERS).changed > DRAWN / 2
+
+
+def test_laws_that_all_diverge_where_the_one_known_before_lasts_are_changed_there():
+    wild = [law(-9.0), law(-9.1)]
+    lost = DRAWN - lasting_under(wild, setup(), drawn_controllers(setup(), UNIT), WORKERS)[0]
+    found = elsewhere(wild, law(1.0), setup(), UNIT, WORKERS)
+    assert found.drawn == DRAWN and found.changed >= lost > DRAWN / 2
 
 
 def test_a_single_law_parts_from_none():

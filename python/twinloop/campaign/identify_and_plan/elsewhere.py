@@ -30,7 +30,7 @@ class Elsewhere(NamedTuple):
     Two laws part under a controller where they differ by more than a fifth of the motion, or only one of them diverges.
 
     Args:
-        drawn: controllers under which not all of the committee diverge.
+        drawn: controllers under which not all diverge, of the committee and the law known before.
         apart: of these, those under which the middle one of the other members parts from the first.
         changed: of these, those under which the law known before the last flight parts from the first.
     """
@@ -63,7 +63,7 @@ def elsewhere(
     known = [] if before is None else [before]
     runs = _flown([*members, *known], setup, drawn_controllers(setup, unit), workers)
     first, *others = runs[: len(members)]
-    lasts = np.any([run.lasted == setup.steps for run in (first, *others)], axis=0)
+    lasts = np.any([run.lasted == setup.steps for run in runs], axis=0)
     parted = np.array([_part(first, other, setup) for other in others]).reshape(-1, DRAWN)
     # The middle one; a law of which there is no other parts from none.
     apart = 2 * parted.sum(axis=0) > len(parted)
