@@ -1,5 +1,7 @@
 """Masses behind gaps are found where there are some, and nowhere else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import twinloop as tl
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
+from twinloop.identification.proposals import gaps
 from twinloop.identification.records import Run
 
 WORKERS = _core.Workers(2)
@@ -73,6 +76,18 @@ def test_a_load_behind_backlash_is_found_by_its_motor_alone(plant):
 
 def test_without_storage_none_is_looked_for():
     assert not learnt([drive(seed) for seed in (0, 1)], storage=False).actuation.stored
+
+
+def test_a_mass_that_tuning_drops_is_none(monkeypatch):
+    """Of a robot's leg terms stayed that were found beside a mass, and the law was the better for them alone."""
+
+    def dropped(context, with_mass, known):
+        assert with_mass.actuation.hidden and not known.actuation.hidden
+        return replace(known, fit=replace(known.fit, length=known.fit.length - 10.0))
+
+    monkeypatch.setattr(gaps, "_polished", dropped)
+    found = learnt([drive(seed) for seed in (0, 1)])
+    assert not any(one.gap for one in found.actuation.hidden)
 
 
 @pytest.mark.parametrize("rubbing", [0.0, 3.0])

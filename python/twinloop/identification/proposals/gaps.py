@@ -182,7 +182,12 @@ def _with_more(context: Context, with_mass: Hypothesis, place: int) -> Hypothesi
 
 
 def _closed(context: Context, with_mass: Hypothesis, place: int) -> Iterator[Hypothesis]:
-    """The hypothesis with a spring in the place of a gap, as two hidden states that turn; none where they would not."""
+    """The hypothesis with a spring in the place of a gap, as two hidden states that turn; none where they would not.
+
+    None either where tuning has shown that nothing of its mass presses, so that it went and other terms stayed.
+    """
+    if not with_mass.actuation.hidden:
+        return
     begun = settled(replace(with_mass, candidates=with_mass.candidates.growing()))
     own, known, pool = begun.actuation.hidden[0], begun.sums[place], begun.pool
     stiffness = 1.0 / (own.turns * own.turns)
