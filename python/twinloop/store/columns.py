@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from datetime import datetime
 
 from twinloop.errors import InvalidInput
@@ -42,6 +43,32 @@ def provenance_in(column: str, text: object, what: str) -> Record:
         if found.get(key) is not None and not isinstance(found[key], kind):
             raise _changed(f"{column}, {key}", name, found[key], what)
     return found
+
+
+def progress_in(column: str, text: object, what: str) -> Record:
+    """What a writer says that it does: the fields of `Doing` without `silent`.
+
+    Args:
+        column: its table and name, for an error.
+        text: that stands there.
+        what: the store and the campaign, likewise.
+
+    Raises:
+        InvalidInput: a field that is missing, or that is of another type.
+    """
+    found = record_in(column, text, what)
+    phase, left = found.get("phase"), found.get("left")
+    timed = left is None or isinstance(left, int) or (isinstance(left, float) and math.isfinite(left))
+    counts = ("generation", "generations", "told", "experiments")
+    fields = [
+        ("phase", "a text", isinstance(phase, str)),
+        *((key, "a whole number", isinstance(found.get(key), int)) for key in counts),
+        ("left", "a number or null", timed),
+    ]
+    for key, expected, fits in fields:
+        if not fits:
+            raise _changed(column, f"{expected} as {key!r}", found.get(key), what)
+    return {key: found.get(key) for key, _, _ in fields}
 
 
 def moment_in(column: str, text: object, what: str) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from typing import get_type_hints
 
-from twinloop.records import Record, read
-from twinloop.store.columns import moment_in, record_in
+from twinloop.store.columns import moment_in, progress_in
 from twinloop.store.database import Store
 
 
@@ -31,25 +29,7 @@ class Doing:
     told: int
     experiments: int
     left: float | None
-    silent: float = 0.0
-
-    @classmethod
-    def of(cls, record: Record, silent: float, where: str) -> Doing:
-        """What a writer has said.
-
-        Args:
-            record: of its progress.
-            silent: seconds since then.
-            where: it stands, for an error.
-
-        Raises:
-            InvalidInput: a record that lacks something, or has something of another type.
-        """
-        hints = get_type_hints(cls)
-        said = {
-            name: read(hints[name], record.get(name), f"{where}.{name}") for name in hints if name != "silent"
-        }
-        return cls(**said, silent=silent)
+    silent: float
 
 
 def state(store: Store, name: str) -> str:
@@ -101,5 +81,4 @@ def doing(store: Store, name: str) -> Doing | None:
     what = f"Store {store.name}, campaign {name}"
     said = datetime.fromisoformat(moment_in("progress.said", row.said, what))
     silent = (datetime.now(timezone.utc) - said).total_seconds()
-    record = record_in("progress.record", row.record, what)
-    return Doing.of(record, max(0.0, silent), f"of {what}, progress.record")
+    return Doing(**progress_in("progress.record", row.record, what), silent=max(0.0, silent))
