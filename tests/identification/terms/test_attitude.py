@@ -68,8 +68,8 @@ def placed(units=("m", "m", "m", "m/s", "m/s", "m/s"), attitude=True):
 def test_places_change_by_the_velocity_of_the_body_as_its_pose_turns_it(pose, velocity):
     signals, pool = placed(), Pool(13)
     row = np.array([[*pose, *[0.0] * 6, *velocity, 0.0]])
-    turned = Rotation.from_euler("ZYX", pose[::-1]).apply(velocity)
-    np.testing.assert_allclose(pool.values(carried(pool, signals), row)[0], turned, atol=1e-13)
+    along_the_earth = Rotation.from_euler("ZYX", pose[::-1]).apply(velocity)
+    np.testing.assert_allclose(pool.values(carried(pool, signals), row)[0], along_the_earth, atol=1e-13)
     assert [pool.length(node) for node in carried(pool, signals)] == [pool.length(0)] * 3
 
 

@@ -102,39 +102,34 @@ def carried(pool: Pool, signals: Signals) -> list[int]:
 
     There are three where exactly three states have the unit of a place that is driven, per second: they are taken for
     the velocity along the body's axes, forward, sideways and along its vertical, in this order. Where they are along
-    the earth's already, the place changes by one of them alone, which is as short. The last one's sign is that of a
-    place along the body's vertical; the other is that of the term's weight.
+    the earth's already, the place changes by one of them alone, which is as short. A place that grows against the
+    vertical, such as a height where the vertical points down, has the last one with a weight below 0.
     """
-    waves = _waves(pool, signals)
-    velocities = _velocities(signals)
+    waves, turns, velocities = _waves(pool, signals), tilts(pool, signals), _velocities(signals)
     if waves is None or not velocities:
         return []
-    sin_roll, sin_pitch, sin_yaw, cos_roll, cos_pitch, cos_yaw = waves
-    down = pool.product(sin_roll, sin_pitch)
-    north, east = _along_the_earth(pool, waves)
-    turns = [
-        [
+    _, _, sin_yaw, cos_roll, cos_pitch, cos_yaw = waves
+    sin_pitch, across, level, north, east = turns
+    ahead, aside, below = velocities
+    down = pool.product(waves.sin_roll, sin_pitch)
+    horizontal = [
+        (
             pool.product(cos_pitch, cos_yaw),
             pool.add("-", pool.product(down, cos_yaw), pool.product(cos_roll, sin_yaw)),
             north,
-        ],
-        [
+        ),
+        (
             pool.product(cos_pitch, sin_yaw),
             pool.add("+", pool.product(down, sin_yaw), pool.product(cos_roll, cos_yaw)),
             east,
-        ],
+        ),
     ]
     found = []
-    for row in turns:
-        ahead, aside, below = (pool.product(turn, v) for turn, v in zip(row, velocities, strict=True))
-        found.append(pool.add("+", pool.add("+", ahead, aside), below))
-    ahead, aside, below = velocities
-    level = pool.add(
-        "+",
-        pool.product(pool.product(sin_roll, cos_pitch), aside),
-        pool.product(pool.product(cos_roll, cos_pitch), below),
-    )
-    found.append(pool.add("-", level, pool.product(sin_pitch, ahead)))
+    for row in horizontal:
+        parts = [pool.product(turn, velocity) for turn, velocity in zip(row, velocities, strict=True)]
+        found.append(pool.add("+", pool.add("+", parts[0], parts[1]), parts[2]))
+    vertical = pool.add("+", pool.product(across, aside), pool.product(level, below))
+    found.append(pool.add("-", vertical, pool.product(sin_pitch, ahead)))
     for place in found:
         # As short as an input.
         pool.found.setdefault(place, pool.length(0))
@@ -172,5 +167,5 @@ def attitude(pool: Pool, signals: Signals) -> list[int]:
     """
     found = tilts(pool, signals)
     single = [signals.n_x + group[0] for group in alike_commands(signals) if len(group) == 1]
-    turned = [node for pair in product(found, single) for node in tilted(pool, *pair)]
-    return [*found, *turned, *carried(pool, signals)]
+    pulling = [node for pair in product(found, single) for node in tilted(pool, *pair)]
+    return [*found, *pulling, *carried(pool, signals)]
