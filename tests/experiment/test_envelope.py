@@ -1,4 +1,4 @@
-"""Leaving the envelope: one true state is enough, of readings it takes two in a row."""
+"""Leaving the envelope: one true state is enough, of readings it takes two of five in a row."""
 
 import math
 from itertools import pairwise
@@ -14,9 +14,15 @@ from twinloop.planning.judging import risk
 
 
 @given(st.lists(st.floats(0.0, 3.0), max_size=30))
-def test_readings_leave_where_two_that_follow_each_other_are_outside(usages):
-    expected = any(a > 1.0 and b > 1.0 for a, b in pairwise(usages))
+def test_readings_leave_where_two_of_five_in_a_row_are_outside(usages):
+    expected = any(sum(usage > 1.0 for usage in usages[k : k + 5]) > 1 for k in range(len(usages)))
     assert readings_leave(np.array(usages)) == expected
+
+
+def test_a_swing_leaves_though_no_two_readings_in_a_row_are_outside():
+    swing = 1.15 * np.abs(np.cos(2.0 * math.pi * np.arange(60) / 4.5))
+    assert not any(a > 1.0 and b > 1.0 for a, b in pairwise(swing))
+    assert readings_leave(swing) and not readings_leave(np.where(np.arange(60) == 9, swing, 0.5))
 
 
 def test_a_single_true_state_is_outside_a_bound_is_not():

@@ -1,8 +1,9 @@
 """Leaving the envelope, the one definition: a flight leaves it when its true state is outside, be it for one period.
 
 A simulated flight knows its true states, drawn noise or not, so that one beyond a bound is enough. Of a flown one
-readings are all that is known, and a single one may be the sensor's: two in a row must be outside, as noise is drawn
-anew for each. A guard waits for no second one, for it may be too late then. All look at the usage of the envelope, the
+readings are all that is known, and a single one may be the sensor's, as noise is drawn anew for each: soon after it a
+second one must be outside. Not the next one, for what swings within a few periods is outside at its crests alone. A
+guard waits for no second one, for it may be too late then. All look at the usage of the envelope, the
 most of all states: 1 at a bound, and more outside.
 """
 
@@ -14,6 +15,10 @@ from numpy.typing import NDArray
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.signals import Signals, State
+
+SOON = 5
+"""Readings in a row of which two that are outside are no accident: two crests of what swings in up to eight periods,
+where it is outside on both sides."""
 
 
 def is_bounded(signals: Signals) -> bool:
@@ -71,8 +76,7 @@ def readings_leave(usages: Floats) -> bool:
     Args:
         usages: of it at each reading (n + 1,).
     """
-    beyond = outside(usages)
-    return bool((beyond[1:] & beyond[:-1]).any())
+    return bool((np.diff(np.flatnonzero(outside(usages))) < SOON).any())
 
 
 def gone_from(usages: Floats) -> int | None:

@@ -100,7 +100,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def left_envelope(self) -> bool:
-        """Whether two readings in a row were outside; a single one may be the noise of a sensor."""
+        """Whether two of five readings in a row were outside; a single one may be the noise of a sensor."""
         return readings_leave(self._usages())
 
     @property
