@@ -14,6 +14,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import latest_lesson
 from twinloop.campaign.data.begun import allowed_off
 from twinloop.campaign.setup import Setup
+from twinloop.controllers.in_words import formulas, reading_rules
 from twinloop.faces.about_test import (
     excitation_words,
     foretold,
@@ -115,6 +116,7 @@ class Sheet:
         return {
             "test": test.number,
             "gains": test.parameters,
+            "formulas": formulas(self.setup.controller, test.family),
             "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
             "target_state": {
                 **dict(zip(signals.state_names, np.atleast_2d(test.target_state)[-1].tolist(), strict=True)),
@@ -147,6 +149,7 @@ class Sheet:
             "",
             _table(["set this gain", "to", "unit"], gains),
             "",
+            *self._controller(),
             *_ends(test, file),
             "",
             _begin_within(test),
@@ -165,6 +168,22 @@ class Sheet:
             f"  {self.stored_as.to_type('tell', test.number, 'FLIGHT.csv')}",
         ]
         return "\n".join(lines) + "\n"
+
+    def _controller(self) -> list[str]:
+        """What these gains mean: nothing of a law in Python, which nobody else programs."""
+        described, family = self.setup.controller, self.test.family
+        lines = formulas(described, family)
+        if not lines:
+            return []
+        rules = reading_rules(described, family.signals, lines)
+        commands = "This is what they mean, in each period, in the units of the signals"
+        return [
+            f"{commands}:",
+            "",
+            *(f"  {line}" for line in lines),
+            "",
+            *([" ".join(rules), ""] if rules else []),
+        ]
 
     def _foreseen(self) -> Iterator[str]:
         """The quality and the run that are predicted, and the risk."""
