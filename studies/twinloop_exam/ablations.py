@@ -86,6 +86,7 @@ ABLATIONS: dict[str, Ablation] = {
     "lags": Ablation("lags and delays", {"lags": False}),
     "ramps": Ablation("limited rates of actuators", {"ramps": False}),
     "apart": Ablation("separate lags of alike commands", {"apart": False}),
+    "delays": Ablation("delays moved once terms are known", {"delays": False}),
     "at-once": Ablation("lags dropped that are tuned to nearly 0", {"at_once": False}),
     "hidden": Ablation("a hidden state that commands drive", {"hidden": False}),
     "storage": Ablation("hidden states that measured states drive", {"storage": False}),

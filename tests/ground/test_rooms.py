@@ -33,7 +33,7 @@ FRONTS = {
         "reaching rivals steps unseen use"
     ),
     "campaign/identify_and_plan": "method track_record",
-    "controllers": "custom family gains riccati state_feedback",
+    "controllers": "custom family gains in_words riccati state_feedback",
     "faces": "answering cli console files notebook plots result run_info terminal",
     "faces/dashboard": "command",
     "faces/figures": "catalogue figure plots saving style svg units",
@@ -44,7 +44,8 @@ FRONTS = {
     "identification": "identified identify outliers records remarks settings",
     "identification/fit": "alternation committee fitting models predictions promises settling tuning",
     "identification/proposals": (
-        "apart at_once bare contacts exponentials friction gaps hidden lags parts second_look storage terms undisturbed"
+        "apart at_once bare contacts delays exponentials friction gaps hidden lags parts second_look storage terms"
+        " undisturbed"
     ),
     "identification/search": (
         "behind_a_law directions drives hidden masses moderation noise problem screen selection structure walks"

@@ -14,6 +14,7 @@ from twinloop.identification.proposals.apart import apart
 from twinloop.identification.proposals.at_once import at_once
 from twinloop.identification.proposals.bare import bare
 from twinloop.identification.proposals.contacts import contacts
+from twinloop.identification.proposals.delays import delays
 from twinloop.identification.proposals.exponentials import exponentials
 from twinloop.identification.proposals.friction import friction
 from twinloop.identification.proposals.gaps import gaps
@@ -30,8 +31,8 @@ from twinloop.records import Record, Recorded
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
 PROPOSALS: tuple[Proposal, ...] = (
-    lags, hidden, terms, undisturbed, apart, storage, friction, exponentials, contacts, gaps, second_look, parts, bare,
-    at_once,
+    lags, hidden, terms, undisturbed, apart, storage, friction, exponentials, contacts, gaps, second_look, delays,
+    parts, bare, at_once,
 )  # fmt: skip
 """In the order in which they are made."""
 BEHIND = 100.0

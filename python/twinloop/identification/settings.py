@@ -65,6 +65,8 @@ class IdentificationOptions:
         friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
         ramps: whether actuators may move at a limited rate.
+        delays: whether, once terms are known, periods of a delay take the place of a part of a lag, or the other way
+            about.
         at_once: whether a lag that is tuned to nearly 0, or a limit of a rate that nothing meets, is dropped.
         apart: whether commands of the same unit and bounds may have different lags.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
@@ -131,6 +133,7 @@ class IdentificationOptions:
     friction: bool = True
     lags: bool = True
     ramps: bool = True
+    delays: bool = True
     at_once: bool = True
     apart: bool = True
     longest_delay: int = 2
