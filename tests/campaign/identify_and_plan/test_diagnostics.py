@@ -447,6 +447,12 @@ def test_sensors_of_their_own_and_exact_steps_are_not_computed_from_each_other()
         ),
         (Elsewhere(20, 0, 6), "under 6 the law differs from that of before the last flight by more"),
         (Elsewhere(4, 2, 4), "under 2 laws of the committee differ and under 4 the law differs from"),
+        (Elsewhere(24, 2, 2, 8), None),
+        (
+            Elsewhere(23, 2, 2, 9),
+            "Under 9 of 32 controllers drawn from the whole box of gains all laws that are known",
+        ),
+        (Elsewhere(2, 1, 0, 30), "wrong there. Of the other 2, under 1 laws of the committee differ by more"),
         (Elsewhere(), None),
     ],
 )

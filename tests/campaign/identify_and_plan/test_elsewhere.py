@@ -63,7 +63,7 @@ def slowly(members, before, asked):
             parted = [part(first, other) for other in others]
             apart += sum(parted) > len(parted) / 2
             changed += part(first, known)
-    return Elsewhere(drawn, apart, changed)
+    return Elsewhere(drawn, apart, changed, DRAWN - drawn)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_laws_part_where_their_flights_do(dampings, before):
 
 def test_what_is_known_well_is_the_same_everywhere_and_what_is_not_is_apart():
     near, far = law(1.0), law(8.0)
-    assert elsewhere([near, law(1.01)], law(1.02), setup(), UNIT, WORKERS)[1:] == (0, 0)
+    assert elsewhere([near, law(1.01)], law(1.02), setup(), UNIT, WORKERS)[1:] == (0, 0, 0)
     assert elsewhere([near, far, far], near, setup(), UNIT, WORKERS).apart > DRAWN / 2
     assert elsewhere([near, near], far, setup(), UNIT, WORKERS).changed > DRAWN / 2
 
@@ -89,10 +89,12 @@ def test_laws_that_all_diverge_where_the_one_known_before_lasts_are_changed_ther
     lost = DRAWN - lasting_under(wild, setup(), drawn_controllers(setup(), UNIT), WORKERS)[0]
     found = elsewhere(wild, law(1.0), setup(), UNIT, WORKERS)
     assert found.drawn == DRAWN and found.changed >= lost > DRAWN / 2
+    nowhere = elsewhere(wild, None, setup(), UNIT, WORKERS)
+    assert nowhere.lost == lost and nowhere.drawn == DRAWN - lost and nowhere.all_drawn == DRAWN
 
 
 def test_a_single_law_parts_from_none():
-    assert elsewhere([law(1.0)], None, setup(), UNIT, WORKERS)[1:] == (0, 0)
+    assert elsewhere([law(1.0)], None, setup(), UNIT, WORKERS)[1:] == (0, 0, 0)
 
 
 def test_a_law_lasts_under_as_many_of_the_drawn_controllers_as_it_does_one_by_one():

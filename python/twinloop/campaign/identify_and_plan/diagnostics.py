@@ -174,19 +174,30 @@ def _does_not_follow(
 
 
 def _elsewhere(found: Elsewhere) -> Iterator[Remark]:
-    """Under how many controllers laws part that follow the flights about equally well, or the law still changes."""
+    """Under how many controllers laws part that follow the flights equally well, the law changes, or none lasts."""
     whats = [
         (found.apart, "laws of the committee differ"),
         (found.changed, "the law differs from that of before the last flight"),
     ]
-    said = [f"under {count} {what}" for count, what in whats if count > MANY * found.drawn]
-    if said:
-        yield note(
-            "elsewhere",
-            f"Of {found.drawn} controllers drawn from the whole box of gains, {' and '.join(said)} by more than a fifth"
-            " of the motion, or only one of two diverges. The flights so far do not tell what such gains do: trust the"
-            " twin near the gains that flew.",
+    parted = [f"under {count} {what}" for count, what in whats if count > MANY * found.drawn]
+    said = []
+    if found.lost > MANY * found.all_drawn:
+        said.append(
+            f"Under {found.lost} of {found.all_drawn} controllers drawn from the whole box of gains all laws that are"
+            " known diverge: the system does, too, or they are wrong there."
         )
+    if parted:
+        of = (
+            f"the other {found.drawn}"
+            if said
+            else f"{found.drawn} controllers drawn from the whole box of gains"
+        )
+        said.append(
+            f"Of {of}, {' and '.join(parted)} by more than a fifth of the motion, or only one of two diverges."
+        )
+    if said:
+        trust = "The flights so far do not tell what such gains do: trust the twin near the gains that flew."
+        yield note("elsewhere", " ".join([*said, trust]))
 
 
 def _in_pieces(experiments: Sequence[Experiment], pieces: Sequence[int], dt: float) -> Iterator[Remark]:

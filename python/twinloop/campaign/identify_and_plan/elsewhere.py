@@ -33,11 +33,18 @@ class Elsewhere(NamedTuple):
         drawn: controllers under which not all diverge, of the committee and the law known before.
         apart: of these, those under which the middle one of the other members parts from the first.
         changed: of these, those under which the law known before the last flight parts from the first.
+        lost: other controllers that were drawn, under which all of these laws diverge.
     """
 
     drawn: int = 0
     apart: int = 0
     changed: int = 0
+    lost: int = 0
+
+    @property
+    def all_drawn(self) -> int:
+        """How many controllers were drawn; 0 where nothing was compared."""
+        return self.drawn + self.lost
 
 
 NOWHERE = Elsewhere()
@@ -68,7 +75,7 @@ def elsewhere(
     # The middle one; a law of which there is no other parts from none.
     apart = 2 * parted.sum(axis=0) > len(parted)
     changed = _part(first, runs[-1], setup) if known else np.zeros(DRAWN, dtype=bool)
-    return Elsewhere(int(lasts.sum()), int((lasts & apart).sum()), int((lasts & changed).sum()))
+    return Elsewhere(*(int(under.sum()) for under in (lasts, lasts & apart, lasts & changed, ~lasts)))
 
 
 def drawn_controllers(setup: Setup, unit: Unit) -> Floats:
