@@ -84,6 +84,7 @@ class Comparison:
         safe = bool(inside and not outside(flights.usages).any())
         predicted, spread = expected(flights.qualities[:, :, 0])
         excitation, disagreement = self.drafts.excitation[chosen], float(self.tells[chosen])
+        held = self._held_back(chosen) if self.committee.leads else 0.0
         return Proposal(
             genes=self.drafts.genes[chosen],
             initial_state=self.drafts.ends[0][chosen],
@@ -94,8 +95,8 @@ class Comparison:
             risk=risk(flights.usages),
             safe=safe,
             disagreement=disagreement,
-            gain=self.gain,
-            reason=reason(self._why(chosen, safe, disagreement), self.judge.signals),
+            gain=self.gain + held,
+            reason=reason(self._why(chosen, safe, disagreement, held), self.judge.signals),
         )
 
     @cached_property
@@ -256,7 +257,18 @@ class Comparison:
         flown = self.judge.test(self.flown.best, task.initial_state, task.target_state)
         return self.committee.moved_by_gusts(flown).left
 
-    def _why(self, chosen: int, safe: bool, disagreement: float) -> Why:
+    def _held_back(self, chosen: int) -> float:
+        """By how much the most promising candidate is better than the chosen one; 0 where it bears that its law ends.
+
+        Flights that go further step by step may lead there, which knowing the right member alone does not.
+        """
+        promising = np.where(self.keeps, self.quiet.mean, np.inf)
+        best, mean = int(np.argmin(promising)), float(self.quiet.mean[chosen])
+        if not mean > promising[best] or not np.isfinite(mean) or self._bears_ending([best])[0]:
+            return 0.0
+        return float(mean - promising[best])
+
+    def _why(self, chosen: int, safe: bool, disagreement: float, held: float) -> Why:
         row, state, high, low = self.where[chosen].tolist()
         repeats = chosen >= self.drafts.repeats
         return Why(
@@ -279,6 +291,7 @@ class Comparison:
             lawless=tuple(self.judge.signals.state_names[i] for i in self.committee.lawless),
             untunable=tuple(self.judge.family.names[i] for i in self.committee.untunable),
             halfway=bool(self._halfway[chosen]) and not self._halfway.all(),
+            held=held > self.options.worse * float(self.quiet.mean[chosen]),
         )
 
 

@@ -34,6 +34,7 @@ class Why:
         lawless: names of states of which no law is known.
         untunable: names of the gains that cannot be tuned for that.
         halfway: whether some candidates lead too far towards gains of flights that the twin is wrong about.
+        held: whether clearly better ones are held back, since they would leave the envelope if what states do ended.
     """
 
     trusted: bool
@@ -54,6 +55,7 @@ class Why:
     lawless: tuple[str, ...] = ()
     untunable: tuple[str, ...] = ()
     halfway: bool = False
+    held: bool = False
 
 
 def reason(why: Why, signals: Signals) -> str:
@@ -70,6 +72,11 @@ def reason(why: Why, signals: Signals) -> str:
         sentences.append(
             "An earlier flight was clearly worse than the twin predicts it even now, or left its envelope: these gains"
             " go at most halfway from the best ones flown to those of that flight."
+        )
+    if why.held:
+        sentences.append(
+            "Gains that promise more are held back: they lead further than flights have, and out of the envelope if"
+            " what holds the states back ends where flights have been."
         )
     if not why.safe:
         sentences.append(
