@@ -51,7 +51,7 @@ def reading_rules(described: UnboundFamily, signals: Signals, lines: Sequence[st
                 " integral pushes it further out."
             )
     if ")/dt" in text:
-        said.append("d(x)/dt is the difference of two readings over a period, 0 in the first one.")
+        said.append("d(x)/dt is a reading less the one before, over the period; 0 in the first period.")
     if isinstance(described, (PID, Cascade)) and described.derivative_filter > 0.0 and "filtered(" in text:
         share = signals.dt / (signals.dt + described.derivative_filter)
         said.append(
