@@ -37,7 +37,8 @@ class Advice:
             test.
         trusted: whether the twin followed its runs at that time and does now, nothing serious is said against it, and
             commands act in it; if not, there is no advice.
-        gain: improvement of the quality if it were known which model is right; None without a committee.
+        gain: improvement of the quality if it were known which model is right, and gains that are held back could be
+            flown; None without a committee.
         share: `gain` over the quality of the controller to fly; None if either is unknown.
         scatter: standard deviation of the quality of a repeated flight, by sensors' noise alone; None: it is unknown.
         stop: whether the gain is below the scatter, so that for the controller another experiment does not pay. None

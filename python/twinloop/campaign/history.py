@@ -212,7 +212,8 @@ class Planned(Recorded, kind="planned"):
         risk: probability that the flight leaves the envelope, by the committee; None without one.
         safe: whether every member keeps the margin; None without a committee.
         bits: expected information of the flight; None without a committee.
-        gain: improvement of the quality if the right member were known; None without a committee.
+        gain: improvement of the quality if the right member were known, and gains that are held back could be flown;
+            None without a committee.
         reason: why this one.
         flown: quality on the system, mean over complete runs; None if there was none.
     """

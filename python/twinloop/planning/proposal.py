@@ -99,7 +99,8 @@ class Proposal:
         risk: share of predicted flights that leave the envelope, with half a flight added on either side.
         safe: whether every member keeps the margin, and the envelope under every draw of the sensors' noise.
         disagreement: of the committee, log det.
-        gain: quality that knowing the right member would bring, by the committee's own estimate.
+        gain: quality that knowing the right member would bring, and gains that are held back, by the committee's own
+            estimate.
         reason: for a person.
         hold_back: what holds its excitation back; None: nothing does.
     """

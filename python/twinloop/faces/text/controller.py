@@ -112,13 +112,16 @@ def advice_words(result: Mapping[str, Any]) -> str:
     share = (
         f", {two_digits(100.0 * advice['share'])} % of what it is now" if advice["share"] is not None else ""
     )
-    words = f"When test {advice['before_test']} was planned, knowing which model is right would"
+    planned = f"When test {advice['before_test']} was planned, knowing which model is right"
     size = None if scatter is None else with_unit(scatter, unit)
     if advice["gain"] == 0.0:
         stop = f" {_stop(result)}" if advice["stop"] else ""
         scattered = "" if size is None else f"\nThe sensors alone scatter one measurement by {size}."
-        return f"{words} not have improved\nthe quality.{stop}{scattered}"
-    words += f" have improved the quality\nby {with_unit(advice['gain'], unit)}{share}."
+        return f"{planned} would not have improved\nthe quality.{stop}{scattered}"
+    words = (
+        f"{planned}, and flying gains\nthat are held back, would have improved the quality"
+        f" by {with_unit(advice['gain'], unit)}{share}."
+    )
     if size is None:
         return words
     by_sensors = f"what the sensors alone scatter one measurement by, {size}"
