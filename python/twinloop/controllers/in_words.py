@@ -52,7 +52,7 @@ def reading_rules(described: UnboundFamily, signals: Signals, lines: Sequence[st
             )
     if ")/dt" in text:
         said.append("d(x)/dt is a reading less the one before, over the period; 0 in the first period.")
-    if isinstance(described, (PID, Cascade)) and described.derivative_filter > 0.0 and "filtered(" in text:
+    if isinstance(described, (PID, Cascade)) and "filtered(" in text:
         share = signals.dt / (signals.dt + described.derivative_filter)
         said.append(
             f"filtered(r) begins with r, and moves by {share:.4g} of the way to r in each period after it."

@@ -258,15 +258,17 @@ class Comparison:
         return self.committee.moved_by_gusts(flown).left
 
     def _held_back(self, chosen: int) -> float:
-        """By how much the most promising candidate is better than the chosen one; 0 where it bears that its law ends.
+        """By how much the most promising candidate is better than the chosen one, and than all that may be chosen.
 
-        Flights that go further step by step may lead there, which knowing the right member alone does not.
+        Others bear that their law ends where flights have been; 0 where this one does, too. Flights that go further
+        step by step may lead there, which knowing the right member alone does not.
         """
         promising = np.where(self.keeps, self.quiet.mean, np.inf)
-        best, mean = int(np.argmin(promising)), float(self.quiet.mean[chosen])
-        if not mean > promising[best] or not np.isfinite(mean) or self._bears_ending([best])[0]:
+        best, others = int(np.argmin(promising)), np.flatnonzero(self.keeps).tolist()
+        if not np.isfinite(promising[best]) or self._bears_ending([best])[0]:
             return 0.0
-        return float(mean - promising[best])
+        least = np.append(promising[others][self._bears_ending(others)], self.quiet.mean[chosen]).min()
+        return max(0.0, float(least - promising[best])) if np.isfinite(least) else 0.0
 
     def _why(self, chosen: int, safe: bool, disagreement: float, held: float) -> Why:
         row, state, high, low = self.where[chosen].tolist()
